@@ -251,13 +251,13 @@ def test_filters_are_the_biquads_of_python_and_are_copied(tab: Tab) -> None:
         "velocity": {"gain": TRIAL["gain"], "integral_time_s": TRIAL["integral_time_s"]},
         "position": {"gain": TRIAL["position_gain"]},
     }
-    assert "check-loop: not checked" in text
+    assert "loop check: not checked" in text
 
 
 def test_an_unchecked_loop_is_shown_and_nothing_is_written(tab: Tab, run: Path) -> None:
     before = sorted((path.name, path.stat().st_mtime_ns) for path in run.rglob("*"))
     check = tab.page.locator("#what-if-check")
-    assert check.inner_text().startswith("check-loop: not checked")
+    assert check.inner_text().startswith("loop check: not checked")
     assert "not promises" in check.inner_text()
     assert "nothing is written to a machine" in tab.page.locator("#what-if-card").inner_text()
     bar = tab.page.locator('#what-if-rows [type=range][data-part="delay"]')

@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.configuration import Axis, open_recording, with_shared_names
+from livebode.configuration import Axis
 from livebode.core import (
     REASONS,
     Block,
@@ -244,7 +244,7 @@ class ResponseMatrix(Estimate):
         if len(results):
             self._remember(results)
             yield results
-        if (shedding := self.run.shedding) is not None:
+        if (shedding := self.shedding) is not None:
             shedding.monitors()
             if not shedding.to_monitor(results):
                 return
@@ -288,11 +288,10 @@ class ResponseMatrix(Estimate):
         return Outcome(directory, summary, matrix=self.newest)
 
 
-def examined_matrix(axis: Axis, to: Destination) -> ExaminedRecording:  # noqa: ARG001 - it is tracked at once
-    """Open a recording."""
-    opened = open_recording(axis)
-    axis = with_shared_names(axis, opened)
-    log = _part(axis, opened)
+def examined_matrix(axis: Axis, logs: Sequence[Log], to: Destination) -> ExaminedRecording:  # noqa: ARG001
+    """A recording, which is tracked at once."""
+    (log,) = logs
+    log = _part(axis, log)
     estimate = ResponseMatrix.of(axis, log.rate_hz)
     log = log.naming(estimate.channels)
     check_length(log.samples, estimate.window)

@@ -8,17 +8,19 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 from shutil import get_terminal_size
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from livebode.cli import can_draw, is_terminal, one_drawing_at_a_time, print_drawn, tell_how_to_draw
-from livebode.configuration import Axis
 from livebode.core import counted
 from livebode.locations import original
 from livebode.pictures import Canvas, Scale, clock, linear_ticks, written
-from livebode.runtime import Draw, Outcome
+from livebode.runtime import Outcome
 from livebode_modes.curves import ModeCurve, mode_curves
+
+if TYPE_CHECKING:
+    from livebode_modes.estimate import OutputOnly
 
 _WIDTH_MIN, _HEIGHT_MIN = 40, 10
 
@@ -84,21 +86,18 @@ def _time_axis(across: Scale, begin: float, end: float, margin: int) -> list[str
     return [" " * margin + f"└{''.join(edge)}┘", " " * (margin + 1) + numbers]
 
 
-def drawing_modes(axis: Axis) -> Draw:
-    """A function that draws modes.png into the directory of a run, if Matplotlib is installed."""
+def draw_modes(estimate: OutputOnly, into: Path) -> None:
+    """Draw modes.png into the directory of a run, if Matplotlib is installed."""
+    if not can_draw():
+        return
+    from livebode.records import RunRecord
+    from livebode_modes.picture import save_modes  # with Matplotlib half a second to import
 
-    def draw(_: object, into: Path) -> None:
-        if not can_draw():
-            return
-        from livebode.records import RunRecord
-        from livebode_modes.picture import save_modes  # with Matplotlib half a second to import
-
-        run = RunRecord.open(into, output_only=True)
-        title = f"{axis.source.title}: {axis.signals.output}"
-        with one_drawing_at_a_time():
-            save_modes(mode_curves(run), into, title=title, facts=_facts(run.summary))
-
-    return draw
+    run, axis = RunRecord.open(into, output_only=True), estimate.axis
+    assert axis is not None
+    title = f"{axis.source.title}: {axis.signals.output}"
+    with one_drawing_at_a_time():
+        save_modes(mode_curves(run), into, title=title, facts=_facts(run.summary))
 
 
 def _facts(summary: dict[str, Any]) -> str:

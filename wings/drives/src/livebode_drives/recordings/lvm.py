@@ -18,6 +18,7 @@ class LvmRecording(DelimitedRecording):
     """The first segment of the file; a second one ends in a line that is not a row of numbers."""
 
     format: ClassVar[str] = "lvm"
+    named_by_file: ClassVar[bool] = False
 
     def __init__(self, path: Path) -> None:
         self._tags: dict[str, list[str]] = {}

@@ -22,6 +22,7 @@ class TwinCatRecording(DelimitedRecording):
     """A table whose rows of properties (Name, Unit, SymbolName …) also show which columns are times in ms."""
 
     format: ClassVar[str] = "twincat"
+    named_by_file: ClassVar[bool] = False
 
     def __init__(self, path: Path) -> None:
         self._properties: dict[str, list[str]] = {}

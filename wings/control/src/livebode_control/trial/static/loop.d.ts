@@ -30,7 +30,7 @@ export interface LoopBand {
 /** What a trial of other gains and filters needs; see loop_trial.py. */
 export interface LoopFacts {
   described: boolean;
-  /** of `livebode check-loop` */
+  /** of `livebode validate --loop` */
   verdict: "as described" | "one change" | "not explained" | "not checked";
   sentence: string;
   /** Key of each parameter in the configuration. */

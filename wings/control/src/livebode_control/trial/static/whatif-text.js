@@ -23,7 +23,7 @@ export const filtersText = ({ rate_hz }, trial) =>
 
 /** The described keys with their values under [loop], and the filters as comments. @param {LoopFacts} facts @param {Trial} trial */
 export function tomlText(facts, trial) {
-  const lines = [`# what if; nothing was written to a machine; check-loop: ${facts.verdict}`];
+  const lines = [`# what if; nothing was written to a machine; loop check: ${facts.verdict}`];
   const values = { ...facts.values, ...trial.values };
   let table = "";
   for (const [name, key] of Object.entries(facts.tables)) {
@@ -52,18 +52,18 @@ export function tomlText(facts, trial) {
   return `${lines.join("\n")}\n`;
 }
 
-/** What was found by `livebode check-loop`, for a person. @param {LoopFacts} facts @returns {[tone: "good" | "bad" | "open", words: string]} */
+/** What was found by `livebode validate --loop`, for a person. @param {LoopFacts} facts @returns {[tone: "good" | "bad" | "open", words: string]} */
 export function checkWords({ described, verdict, sentence }) {
   if (!described) return ["open", tr("The loop is not described: these values are not promises.")];
-  if (verdict === "as described") return ["good", tr("check-loop: as described")];
+  if (verdict === "as described") return ["good", tr("loop check: as described")];
   if (verdict === "not checked")
     return [
       "open",
       tr(
-        "check-loop: not checked. These values are not promises: compare the description with the signals by livebode check-loop.",
+        "loop check: not checked. These values are not promises: compare the description with the signals by livebode validate --loop.",
       ),
     ];
-  return ["bad", tr("check-loop: contradicted. These values are wrong: {sentence}", { sentence: worded(sentence) })];
+  return ["bad", tr("loop check: contradicted. These values are wrong: {sentence}", { sentence: worded(sentence) })];
 }
 
 /** With as many digits at any time, so that a table does not move while a slider does. @param {number} value */

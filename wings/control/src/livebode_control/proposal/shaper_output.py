@@ -1,42 +1,39 @@
-"""`livebode shaper`: input shapers for the resonance of a run."""
+"""`livebode tune --shaper`: input shapers for the resonance of a run."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
-import typer
-
-from livebode.cli import Json, results_directory
+from livebode.cli import results_directory
 from livebode.core import RecordError, write_whole, writing
-from livebode.locations import location
 
 if TYPE_CHECKING:
     from livebode_control.tuning.input_shaper import InputShaper, ModeRange
 
 
-def shaper_command(
-    directory: Annotated[Path, typer.Argument(metavar="RUN", help="Run directory.", parser=location)],
-    model: Annotated[
-        str | None,
-        typer.Option(help="two-mass, two-mass-gain, three-mass or modal, as in fit. \\[default: the run's [fit]]"),
-    ] = None,
-    mode: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME",
-            help="antiresonance (the load swings while a stiff drive holds the motor) or resonance; of several, with a "
-            "number: resonance_2; of modal frequency_1, … \\[default: antiresonance; of modal frequency_1]",
-        ),
-    ] = None,
-    tolerance: Annotated[float, typer.Option(help="Share of the vibration that may remain.")] = 0.05,
-    axis: Annotated[str, typer.Option(metavar="x|y|z", help="Axis in the text for Klipper.")] = "x",
-    as_json: Json = False,
+def propose_shaper(
+    directory: Path, model: str | None, mode: str | None, tolerance: float, axis: str, *, as_json: bool
 ) -> None:
-    """Propose input shapers for a mode of the fitted model, over its bounds at every place of the run.
+    """Write the input shapers for a mode of a run to its directory, and print them.
 
-    Computes ZV, ZVD, EI and an optimised shaper, and writes the shortest with enough effect as shaper.h and shaper.st,
-    and the best that Klipper has as shaper.cfg, to the run directory; nothing to a machine.
+    Parameters
+    ----------
+    directory
+        Of the run.
+    model, mode
+        Model of the fit at every place and its mode; None for the default.
+    tolerance
+        Share of the vibration that may remain.
+    axis
+        Axis in the text for Klipper: x, y or z.
+    as_json
+        Print them as JSON.
+
+    Raises
+    ------
+    RecordError, UsageError
+        If the run has no such model or mode, or is a matrix run.
     """
     from livebode.analysis import modes_by_place
     from livebode.records import RunRecord, matrix_unsupported, to_json

@@ -1,15 +1,12 @@
-"""`livebode check-loop`: the description of a run's loop compared with its signals."""
+"""`livebode validate --loop`: the description of a run's loop compared with its signals."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-import typer
-
-from livebode.cli import Excitation, Json, Output, results_directory
+from livebode.cli import results_directory
 from livebode.core import UsageError
-from livebode.locations import location
 
 if TYPE_CHECKING:
     from livebode.configuration import LoopSection
@@ -18,28 +15,32 @@ if TYPE_CHECKING:
 _LISTED_MAX = 6
 
 
-def check_loop_command(
-    directory: Annotated[Path, typer.Argument(metavar="RUN", help="Run directory.", parser=location)],
-    axis: Annotated[
-        Path | None, typer.Option(metavar="AXIS.toml", help="Read \\[loop] from this file instead of the run.")
-    ] = None,
-    output: Output = None,
-    input: Annotated[str | None, typer.Option(metavar="CHANNEL", help="Channel of the plant input u.")] = None,
-    excitation: Excitation = None,
-    as_json: Json = False,
-) -> None:
-    """Compare the described controllers with the recorded signals: as described, or the change that explains them.
+def validate_loop(directory: Path, axis: Path | None, channels: dict[str, str | None], *, as_json: bool) -> None:
+    """Write loop-check.json of a run to its directory, and print the result.
 
-    Needs excitation, input and output in the samples of the run; the channels default to those of the run. Writes
-    loop-check.json to the run directory: `livebode margins` and `livebode report` show the result. Of a matrix run each
-    of [[loop.controllers]] is compared with its own signals.
+    Parameters
+    ----------
+    directory
+        Of the run; of a matrix run each of [[loop.controllers]] is compared with its own signals.
+    axis
+        File with another [loop] than that of the run.
+    channels
+        Channels by role (excitation, input, output) that replace those of the run.
+    as_json
+        Print the result as JSON.
+
+    Raises
+    ------
+    UsageError
+        If channels are given for a matrix run, or the loop is not described.
+    LivebodeError
+        As of `check_loop_of_run`.
     """
     from livebode.configuration import read_loop
     from livebode.records import RunRecord, to_json
     from livebode_control.loop_check.run_loop_check import check_loop_of_run, store_loop_check
 
     section = None if axis is None else read_loop(axis)
-    channels = {"output": output, "input": input, "excitation": excitation}
     if RunRecord.open(directory, lambda _: None, matrix=True).is_matrix:
         if any(channels.values()):
             raise _no_channels()
