@@ -133,7 +133,7 @@ def test_without_the_wing_control_a_run_has_its_report_and_the_page_the_reason(t
 import sys
 sys.modules["livebode_control"] = None
 from livebode.cli import main
-from livebode.dashboard.trials import loop_trials
+from livebode.dashboard.plugin_pages import loop_trials
 print(loop_trials().facts())
 main()
 """

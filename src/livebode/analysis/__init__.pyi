@@ -1,6 +1,6 @@
 from livebode.analysis._averaged import LIVE_VALUES_MAX as LIVE_VALUES_MAX
-from livebode.analysis._averaged import Averaged as Averaged
 from livebode.analysis._averaged import Overview as Overview
+from livebode.analysis._averaged import RunMean as RunMean
 from livebode.analysis._averaged import averaged as averaged
 from livebode.analysis._averaged import mean_of as mean_of
 from livebode.analysis._loop_report import LoopReport as LoopReport
@@ -12,6 +12,7 @@ from livebode.analysis._margins import Margins as Margins
 from livebode.analysis._margins import against_lines as against_lines
 from livebode.analysis._margins import peak_sensitivity_at_lines as peak_sensitivity_at_lines
 from livebode.analysis._margins import worst as worst
+from livebode.analysis.equivalent import equivalent_plant as equivalent_plant
 from livebode.analysis.fits import fit_averaged as fit_averaged
 from livebode.analysis.fits import fit_remarks as fit_remarks
 from livebode.analysis.fits import fit_run as fit_run

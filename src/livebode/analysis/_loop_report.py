@@ -70,7 +70,7 @@ class LoopReport:
     def plain(self, tuning: dict[str, Any] | None) -> dict[str, Any]:
         """For JSON, with the proposed filter, if one was looked for."""
         bound = self.margins.bound()[0]
-        found = {
+        margins = {
             name: {
                 "value": float(self.margins.value[0, i]),
                 "bound_95": float(bound[i]),
@@ -86,7 +86,7 @@ class LoopReport:
             "model": self.fit.model.name,
             "status": str(self.margins.status[0]),
             "message": self.message,
-            "margins": found,
+            "margins": margins,
             "peak_sensitivity_at_lines": {"at_least": size, "bound": around, "frequency_hz": at_hz},
             "places": len(self.places),
             "worst_over_places": worst(self.places),

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from livebode.analysis._averaged import Averaged, averaged
+from livebode.analysis._averaged import RunMean, averaged
 from livebode.configuration import FitSection, chosen_model, fit_settings
 from livebode.core import read_unit, split_plant_unit
 from livebode.fitting import Chain, Fit, TwoMassGain, fit
@@ -29,7 +29,7 @@ def fit_run(directory: Path, section: FitSection, entry: str | None = None) -> t
     return fit_averaged(averaged(RunRecord.open(directory, entry=entry)), section)
 
 
-def fit_averaged(of: Averaged, section: FitSection) -> tuple[Fit, str]:
+def fit_averaged(of: RunMean, section: FitSection) -> tuple[Fit, str]:
     """Model fitted to the average of a run, and its sentence."""
     words = of.words
     if not of.response.unit:
@@ -37,20 +37,20 @@ def fit_averaged(of: Averaged, section: FitSection) -> tuple[Fit, str]:
     return _best(of, section), words
 
 
-def better_output(of: Averaged, section: FitSection) -> str:
+def better_output(of: RunMean, section: FitSection) -> str:
     """Whether the output is a velocity or a position, by the smaller misfit."""
     return _taken(_better(of, section))
 
 
-def _better(of: Averaged, section: FitSection) -> Fit:
+def _better(of: RunMean, section: FitSection) -> Fit:
     sections = [section]
     if section.output == "auto" and of.kinds.output is None:
         sections = [section.model_copy(update={"output": output}) for output in ("velocity", "position")]
-    found = [fit(of.response, chosen_model(one, of.kinds), **fit_settings(one)) for one in sections]
-    return min(found, key=lambda one: one.epsilon if one.status == "ok" else np.inf)
+    fits = [fit(of.response, chosen_model(candidate, of.kinds), **fit_settings(candidate)) for candidate in sections]
+    return min(fits, key=lambda candidate: candidate.epsilon if candidate.status == "ok" else np.inf)
 
 
-def _best(of: Averaged, section: FitSection) -> Fit:
+def _best(of: RunMean, section: FitSection) -> Fit:
     """The fit; the one with the smaller misfit, where the quantity of the output is not known."""
     best = _better(of, section)
     if best.status != "ok" or best.epsilon < MISFIT_MAX:
@@ -62,13 +62,13 @@ def _best(of: Averaged, section: FitSection) -> Fit:
     )
 
 
-def _taken(found: Fit) -> str:
+def _taken(fitted: Fit) -> str:
     """Quantity for which the output was taken."""
-    assert isinstance(found.asked, Chain | TwoMassGain)  # `chosen_model` gives no other
-    return found.asked.output
+    assert isinstance(fitted.asked, Chain | TwoMassGain)  # `chosen_model` gives no other
+    return fitted.asked.output
 
 
-def fit_remarks(of: Averaged, section: FitSection, found: Fit, output: str, *, live: bool = False) -> list[str]:
+def fit_remarks(of: RunMean, section: FitSection, fitted: Fit, output: str, *, live: bool = False) -> list[str]:
     """Which quantity the output was taken for and why; and if the fit fails, whether the output is inverted.
 
     `output` is the name of its channel, and `live` whether the run is on a live source, which computes no channels.
@@ -81,11 +81,11 @@ def fit_remarks(of: Averaged, section: FitSection, found: Fit, output: str, *, l
         taken = "velocity" if of.kinds.output == "velocity" else "position"
         why = f"by its unit {unit}" if read_unit(unit).kind == of.kinds.output else "as source.kinds declares"
     else:
-        taken = _taken(found)
+        taken = _taken(fitted)
         why = "because neither a unit nor a kind is known"
-        why = f"which has the smaller misfit, {why}" if found.status == "ok" else why
+        why = f"which has the smaller misfit, {why}" if fitted.status == "ok" else why
     remarks = [f"the output {output!r} is fitted as a {taken}, {why}"]
-    if found.status != "ok":
+    if fitted.status != "ok":
         turned = replace(of, response=replace(of.response, value=-of.response.value))
         other = fit_averaged(turned, section)[0]
         if other.status == "ok":
@@ -99,29 +99,29 @@ def fit_remarks(of: Averaged, section: FitSection, found: Fit, output: str, *, l
     return remarks
 
 
-def plain_fit(found: Fit) -> dict[str, Any]:
+def plain_fit(fitted: Fit) -> dict[str, Any]:
     """One fit as plain data."""
     quantities: dict[str, dict[str, Any]] = {
-        name: {"value": value, "bound_95": bound, "unit": unit} for name, value, bound, unit in found.rows()
+        name: {"value": value, "bound_95": bound, "unit": unit} for name, value, bound, unit in fitted.rows()
     }
     for name, quantity in quantities.items():
-        if (limit := found.at_most(name)) is not None:
+        if (limit := fitted.at_most(name)) is not None:
             quantity["at_most"] = limit
         if quantity["bound_95"] == 0:
             quantity["fixed"] = True
     return {
-        "model": found.asked.name if found.asked is not None else found.model.name,
-        "status": found.status,
-        "message": found.sentence,
-        "taken": list(found.taken),
-        "complete": found.complete,
-        "about_bounds": found.about_bounds,
-        "time_s": float(found.parameters.time_s[0]),
-        "schedule": float(found.parameters.schedule[0]),
-        "band_hz": list(found.band_hz),
-        "lines": found.lines,
-        "epsilon": found.epsilon,
-        "reduced_chi2": found.chi2,
-        "held": found.held,
+        "model": fitted.asked.name if fitted.asked is not None else fitted.model.name,
+        "status": fitted.status,
+        "message": fitted.sentence,
+        "taken": list(fitted.taken),
+        "complete": fitted.complete,
+        "about_bounds": fitted.about_bounds,
+        "time_s": float(fitted.parameters.time_s[0]),
+        "schedule": float(fitted.parameters.schedule[0]),
+        "band_hz": list(fitted.band_hz),
+        "lines": fitted.lines,
+        "epsilon": fitted.epsilon,
+        "reduced_chi2": fitted.chi2,
+        "held": fitted.held,
         "quantities": quantities,
     }

@@ -23,9 +23,9 @@ def by_place(responses: Responses) -> Responses:
     use = np.flatnonzero(responses.valid.all(axis=1) & np.isfinite(responses.schedule))
     if not use.size:
         return mean_response(responses)
-    at = responses.schedule[use]
-    edges = np.linspace(at.min(), at.max(), _PLACES + 1)
-    place = np.clip(np.searchsorted(edges, at, side="right") - 1, 0, _PLACES - 1)
+    schedule = responses.schedule[use]
+    edges = np.linspace(schedule.min(), schedule.max(), _PLACES + 1)
+    place = np.clip(np.searchsorted(edges, schedule, side="right") - 1, 0, _PLACES - 1)
     groups = [use[place == i] for i in range(_PLACES)]
     return Responses.join([mean_response(responses[group]) for group in groups if group.size])
 
@@ -49,17 +49,17 @@ def fits_by_place(directory: Path, model: str | None = None) -> tuple[PhysicalMo
         section = section.model_copy(update={"output": better_output(averaged(run), section)})
     fitter = fitter_of(section, run.kinds)
     responses = by_place(Responses.join(list(run.steady_batches())))
-    found = fitter.process(responses)
-    use = found.ok & (found.epsilon < MISFIT_MAX)
+    fits = fitter.process(responses)
+    use = fits.ok & (fits.epsilon < MISFIT_MAX)
     if not use.any():
-        why = f"it differs by {100 * found.epsilon[0]:.0f} % of |G|" if found.ok[0] else found.status[0]
+        why = f"it differs by {100 * fits.epsilon[0]:.0f} % of |G|" if fits.ok[0] else fits.status[0]
         raise TuneError(
             "no-mode",
-            f"the {found.model} model fits at no place: {why}",
+            f"the {fits.model} model fits at no place: {why}",
             "choose the model 'modal', as in livebode fit",
             argument="model",
         )
-    rows = found[np.flatnonzero(use)]
+    rows = fits[np.flatnonzero(use)]
     order = np.argsort(np.nan_to_num(rows.schedule), kind="stable")
     return fitter.model, rows[order]
 
@@ -72,8 +72,8 @@ def modes_by_place(directory: Path, model: str | None = None) -> Parameters:
     run = RunRecord.open(directory)
     section = _section(run, model)
     if section.model == "modal":
-        found, _ = fit_poles([run], "modal", section)
-        return found.parameters
+        common, _ = fit_poles([run], "modal", section)
+        return common.parameters
     if section.model == "rational":
         raise UsageError(
             "not-one-of", "the model 'rational' has poles, not modes", "choose the model 'modal'", argument="model",
@@ -91,9 +91,9 @@ def _section(run: RunRecord, model: str | None) -> FitSection:
 
 def lpv_model(directory: Path) -> LpvModel:
     """The two-mass model of a run over its schedule; errors as of `fits_by_place` and `LpvModel`."""
-    model, found = fits_by_place(directory)
+    model, fits = fits_by_place(directory)
     return LpvModel(
-        found,
+        fits,
         getattr(model, "output", "velocity"),
         getattr(model, "side", "motor"),
         getattr(model, "radius_m", None),

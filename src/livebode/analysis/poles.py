@@ -47,7 +47,7 @@ def fit_poles(
         )
     averages = [averaged(run) for run in runs]
     band = None if section.band_hz is None else (section.band_hz[0], section.band_hz[1])
-    found = fit_common_poles(
+    poles = fit_common_poles(
         [of.response for of in averages], model, outputs=names, order=order, band_hz=band, hold=section.hold
     )
     remarks = [f"fitted to {averages[0].words}"]
@@ -55,28 +55,28 @@ def fit_poles(
         remarks.append("the runs are of different recordings: the machine is taken as the same in all of them")
     if len(runs) > 1:
         remarks.append("the noise of the outputs is taken as independent; noise that they share makes ± too small")
-    return found, remarks
+    return poles, remarks
 
 
-def plain_poles(found: CommonPoles, remarks: list[str]) -> dict[str, Any]:
+def plain_poles(poles: CommonPoles, remarks: list[str]) -> dict[str, Any]:
     """For JSON."""
-    structure = None if found.found is None else found.found.structure
+    structure = None if poles.best is None else poles.best.structure
     return {
-        "model": found.model,
-        "status": found.status,
-        "message": found.sentence,
-        "outputs": list(found.outputs),
-        "order": found.order,
-        "orders_tried": [{"order": order, "bic": cost} for order, cost in found.tried],
+        "model": poles.model,
+        "status": poles.status,
+        "message": poles.sentence,
+        "outputs": list(poles.outputs),
+        "order": poles.order,
+        "orders_tried": [{"order": order, "bic": cost} for order, cost in poles.tried],
         "integrators": 0 if structure is None else structure.integrators,
         "direct_terms": 0 if structure is None else structure.direct,
-        "complete": found.complete,
-        "about_bounds": found.about_bounds,
-        "band_hz": [float(found.grid.frequency_hz[0]), float(found.grid.frequency_hz[-1])],
-        "lines": int(found.grid.frequency_hz.size),
-        "epsilon": dict(zip(found.outputs, found.epsilon.tolist())),
-        "reduced_chi2": dict(zip(found.outputs, found.chi2.tolist())),
-        "correlation_of_neighbours": dict(zip(found.outputs, found.correlation.tolist())),
-        "quantities": {n: {"value": v, "bound_95": b, "unit": u} for n, v, b, u in found.rows()},
+        "complete": poles.complete,
+        "about_bounds": poles.about_bounds,
+        "band_hz": [float(poles.grid.frequency_hz[0]), float(poles.grid.frequency_hz[-1])],
+        "lines": int(poles.grid.frequency_hz.size),
+        "epsilon": dict(zip(poles.outputs, poles.epsilon.tolist())),
+        "reduced_chi2": dict(zip(poles.outputs, poles.chi2.tolist())),
+        "correlation_of_neighbours": dict(zip(poles.outputs, poles.correlation.tolist())),
+        "quantities": {n: {"value": v, "bound_95": b, "unit": u} for n, v, b, u in poles.rows()},
         "remarks": remarks,
     }

@@ -10,7 +10,7 @@ from livebode.core import ConfigError, Model
 if TYPE_CHECKING:
     from livebode.configuration.axis import Axis
     from livebode.configuration.loop_section import ControllerSection, LoopSection
-    from livebode.mimo import MatrixLoop
+    from livebode.core import MatrixLoop
 
 
 def check_no_matrix(axis: Axis) -> None:
@@ -52,7 +52,7 @@ def _check_controller(controller: ControllerSection, outputs: Sequence[str], inp
 
 def matrix_loop(loop: LoopSection, inputs: list[str], outputs: list[str], rate_hz: float) -> MatrixLoop:
     """The loop of these [[loop.controllers]], recorded at `rate_hz`; ConfigError if a controller cannot be built."""
-    from livebode.mimo import MatrixLoop
+    from livebode.core import MatrixLoop
 
     feedback: list[list[Model | None]] = [[None] * len(outputs) for _ in inputs]
     for controller in loop.controllers:

@@ -54,8 +54,8 @@ def dataset(responses: Responses) -> Dataset:
     coords["frequency_hz"] = labelled("frequency_hz", "frequency_hz", responses.frequency_hz)
     variables = {name: labelled(both, name, getattr(responses, name)) for name in ("sigma", "coherence", "valid")}
     variables |= {"response": labelled(both, "response", responses.value), "dof": labelled(time, "dof", responses.dof)}
-    found: Dataset = xarray.Dataset(variables, coords, _about(responses))
-    return found
+    converted: Dataset = xarray.Dataset(variables, coords, _about(responses))
+    return converted
 
 
 def frame(responses: Responses) -> DataFrame:
@@ -70,10 +70,10 @@ def frame(responses: Responses) -> DataFrame:
         "valid": responses.valid,
     }
     index = pandas.MultiIndex.from_product([responses.time_s, responses.frequency_hz], names=["time_s", "frequency_hz"])
-    found: DataFrame = pandas.DataFrame({name: values.ravel() for name, values in columns.items()}, index=index)
+    table: DataFrame = pandas.DataFrame({name: values.ravel() for name, values in columns.items()}, index=index)
     units = {"response": responses.unit, "sigma": responses.unit, "magnitude_db": "dB", "phase_deg": "deg"}
-    found.attrs = _about(responses) | {"units": units}
-    return found
+    table.attrs = _about(responses) | {"units": units}
+    return table
 
 
 def frd(response: Response) -> Any:

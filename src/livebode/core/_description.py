@@ -16,15 +16,15 @@ _ROWS_MAX = 24
 _HEADS = ("frequency", "magnitude", "phase", "bound (2σ, 98.2 %)", "coherence")
 
 
-def of_response(one: Response) -> str:
+def of_response(response: Response) -> str:
     """
     >>> from livebode import example_responses
     >>> example_responses()[-1]
     <Response: plant in rad/s/(N m), 13 lines, 20 … 140 Hz, all valid, at 0.95 s>
     """
-    known = int(np.count_nonzero(one.valid))
-    valid = "all valid" if known == len(one.lines) else f"{known} valid"
-    return f"<Response: {_named(one)}, {_span(one.lines)}, {valid}, at {moment(one.time_s, 2)}>"
+    known = int(np.count_nonzero(response.valid))
+    valid = "all valid" if known == len(response.lines) else f"{known} valid"
+    return f"<Response: {_named(response)}, {_span(response.lines)}, {valid}, at {moment(response.time_s, 2)}>"
 
 
 def of_responses(many: Responses) -> str:
@@ -42,17 +42,24 @@ def of_responses(many: Responses) -> str:
     return f"<Responses: {len(many)} of {_named(many)}, {len(valid)} valid, {_span(many.lines)}, {times}>"
 
 
-def table_of_response(one: Response) -> str:
+def table_of_response(response: Response) -> str:
     """HTML: a row for each line, thinned to `_ROWS_MAX`; lines that are not valid are grey."""
-    count = len(one.lines)
+    count = len(response.lines)
     shown = np.unique(np.linspace(0, count - 1, min(count, _ROWS_MAX)).round().astype(int))
     with np.errstate(divide="ignore", invalid="ignore"):
-        share = one.bound(2) / np.abs(one.value)
-    values = (one.frequency_hz, one.magnitude_db, one.phase_deg, share, one.coherence, one.valid)
+        share = response.bound(2) / np.abs(response.value)
+    values = (
+        response.frequency_hz,
+        response.magnitude_db,
+        response.phase_deg,
+        share,
+        response.coherence,
+        response.valid,
+    )
     rows = [_row(*row) for row in zip(*(part[shown] for part in values))]
     thinned = f"<caption>{len(rows)} of {count} lines</caption>" if len(rows) < count else ""
     heads = "".join(f"<th>{head}</th>" for head in _HEADS)
-    return f"{_paragraph(of_response(one))}<table>{thinned}<thead><tr>{heads}</tr></thead>{''.join(rows)}</table>"
+    return f"{_paragraph(of_response(response))}<table>{thinned}<thead><tr>{heads}</tr></thead>{''.join(rows)}</table>"
 
 
 def table_of_responses(many: Responses) -> str:

@@ -55,8 +55,8 @@ def dataset(responses: MatrixResponses, reasons: tuple[str, ...]) -> Dataset:
             {"long_name": "of response and sigma"},
         )
     about = {"quantity": "plant", "rate_hz": responses.lines.rate_hz, "window": responses.lines.window}
-    found: Dataset = xarray.Dataset(variables, coords, about)
-    return found
+    converted: Dataset = xarray.Dataset(variables, coords, about)
+    return converted
 
 
 def frd(responses: MatrixResponses, row: int) -> Any:

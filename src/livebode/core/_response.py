@@ -212,19 +212,19 @@ class Responses(RowArrays, FrequencyResponse, Sequence[Response]):
         _fill_unknown(self)
 
     @overload
-    def __getitem__(self, at: int) -> Response: ...
+    def __getitem__(self, rows: int) -> Response: ...
     @overload
-    def __getitem__(self, at: slice | NDArray[Any]) -> Responses: ...
-    def __getitem__(self, at: int | slice | NDArray[Any]) -> Response | Responses:
-        if isinstance(at, slice | np.ndarray):
-            return super().__getitem__(at)
-        rows: dict[str, Any] = {name: getattr(self, name)[at] for name in _PER_ROW}
+    def __getitem__(self, rows: slice | NDArray[Any]) -> Responses: ...
+    def __getitem__(self, rows: int | slice | NDArray[Any]) -> Response | Responses:
+        if isinstance(rows, slice | np.ndarray):
+            return super().__getitem__(rows)
+        values: dict[str, Any] = {name: getattr(self, name)[rows] for name in _PER_ROW}
         for name in PER_RESPONSE:
-            rows[name] = rows[name].item()
-        return Response(lines=self.lines, quantity=self.quantity, unit=self.unit, **rows)
+            values[name] = values[name].item()
+        return Response(lines=self.lines, quantity=self.quantity, unit=self.unit, **values)
 
     def between(self, from_s: float, to_s: float) -> Responses:
-        """Those whose effective time is in a range, ends included."""
+        """Responses whose effective time is in a range, ends included."""
         return self[np.flatnonzero((self.time_s >= from_s) & (self.time_s <= to_s))]
 
     def __iter__(self) -> Iterator[Response]:

@@ -46,11 +46,11 @@ def step_of(samples: Floats) -> float:
         if not least <= step < np.inf:
             return 0.0
         multiples = np.rint(differences / step)
-        rest = np.abs(differences - step * multiples)
-        rest = rest[rest > 4 * error * (1 + multiples) + _CANCELLED * step]
-        if not rest.size:
+        remainder = np.abs(differences - step * multiples)
+        remainder = remainder[remainder > 4 * error * (1 + multiples) + _CANCELLED * step]
+        if not remainder.size:
             return _refined(values, step)
-        step = float(rest.min())
+        step = float(remainder.min())
     return 0.0
 
 

@@ -122,8 +122,8 @@ class Board:
         An acknowledgement includes all earlier events of the same cause.
         """
         state = self.states[asked.axis]
-        found = state.notices.of(asked.event)
-        if found is None:
+        noticed = state.notices.of(asked.event)
+        if noticed is None:
             raise ServerError(
                 "event-unknown",
                 Message("there is no event {event}", event=repr(asked.event)),
@@ -137,7 +137,7 @@ class Board:
                 Message("acknowledge events while a run continues"),
                 event=asked.event,
             )
-        event = _event_of(act, asked, state, *found)
+        event = _event_of(act, asked, state, *noticed)
         if event is not None and not state.hub.record(event):
             raise ServerError(
                 "busy", Message("too many acknowledgements wait to be recorded"), Message("try again in a moment")
@@ -167,16 +167,16 @@ class Board:
 
 def _event_of(act: Act, asked: AlarmRequest, state: State, notice: Notice, count: int) -> Event | None:
     """The event that records an action; None if there is nothing to record."""
-    cause, at = notice.cause, state.position
+    cause, position = notice.cause, state.position
     if act == "acknowledge":
         if notice.seen >= count:
             return None
-        return acknowledgement(notice, asked.event, count, *at, asked.by, asked.words)
+        return acknowledgement(notice, asked.event, count, *position, asked.by, asked.words)
     if notice.alarm is None:
         raise ServerError(
             "no-alarm", Message("this event is not an alarm"), Message("shelve alarms only"), event=asked.event
         )
     if act == "shelve":
         shelf = AlarmShelf(asked.by, round(time.time() + 60 * asked.minutes, 3), asked.words)
-        return shelving(cause, shelf, *at, notice)
-    return unshelving(cause, *at, notice, asked.by) if state.notices.shelf(cause) is not None else None
+        return shelving(cause, shelf, *position, notice)
+    return unshelving(cause, *position, notice, asked.by) if state.notices.shelf(cause) is not None else None

@@ -65,19 +65,19 @@ def verdict(axis: State) -> AxisVerdict:
     if axis.quantities is None:
         return AxisVerdict("open", "not-begun")
     clock, alarms = RunClock(axis.clock), list(axis.notices.alarms())
-    changes = [one for one in alarms if one[0].cause.partition(":")[0] == "change" and one[1].active]
-    if found := [one for one in changes if one[2] in ("unacknowledged", "acknowledged")]:
-        return _of_alarm("alarm", "change", found, clock)
+    changes = [alarm for alarm in alarms if alarm[0].cause.partition(":")[0] == "change" and alarm[1].active]
+    if shown := [alarm for alarm in changes if alarm[2] in ("unacknowledged", "acknowledged")]:
+        return _of_alarm("alarm", "change", shown, clock)
     if (silence := _silence(axis)) is not None:
         return silence
-    if found := [one for one in alarms if one[2] in OPEN]:
-        return _of_alarm("check", "alarms", found, clock)
+    if shown := [alarm for alarm in alarms if alarm[2] in OPEN]:
+        return _of_alarm("check", "alarms", shown, clock)
     if (since_s := axis.notices.suppressed_s) is not None:
         return AxisVerdict("open", "suppressed", since_s, clock.unix_s(since_s))
     if changes:
         return _of_alarm("check", "shelved", changes, clock)
-    if found := [one for one in alarms if one[2] == "acknowledged"]:
-        return _of_alarm("check", "active", found, clock)
+    if shown := [alarm for alarm in alarms if alarm[2] == "acknowledged"]:
+        return _of_alarm("check", "active", shown, clock)
     if not axis.has_baseline:
         return AxisVerdict("open", "no-baseline")
     if (since_s := axis.notices.unmonitored_s) is not None:
@@ -86,13 +86,13 @@ def verdict(axis: State) -> AxisVerdict:
 
 
 def _of_alarm(
-    tone: Tone, word: str, found: list[tuple[Notice, AlarmStatus, AlarmState]], clock: RunClock
+    tone: Tone, word: str, shown: list[tuple[Notice, AlarmStatus, AlarmState]], clock: RunClock
 ) -> AxisVerdict:
     """Verdict of the most important of these alarms; among equal ones the oldest."""
-    notice, alarm, _ = min(found, key=lambda one: (PRIORITIES.index(one[1].kind.priority), one[1].since_s))
+    notice, alarm, _ = min(shown, key=lambda alarm: (PRIORITIES.index(alarm[1].kind.priority), alarm[1].since_s))
     since_s = alarm.since_s
     return AxisVerdict(
-        tone, word, since_s, clock.unix_s(since_s), None, alarm.facts, notice.words, len(found), notice.cause
+        tone, word, since_s, clock.unix_s(since_s), None, alarm.facts, notice.words, len(shown), notice.cause
     )  # fmt: skip
 
 

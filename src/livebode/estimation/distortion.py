@@ -66,10 +66,10 @@ class Distortion:
     """
 
     def __init__(self, lines: Lines) -> None:
-        at = np.asarray(lines.bins)
+        bins = np.asarray(lines.bins)
         self.bins = reached(lines)
-        self.interpolation = Interpolation(at, self.bins)
-        self.groups = Groups(at, self.bins)
+        self.interpolation = Interpolation(bins, self.bins)
+        self.groups = Groups(bins, self.bins)
         self.dof = float(self.groups.dof.min())
 
     def repeats(
@@ -101,13 +101,13 @@ class Distortion:
             mean = np.where(excited, np.nan, mean)
         as_output = self.groups.at(mean - noise)
         as_input = self.groups.at((mean - noise) / power(model)) * power(ratio)
-        found = np.maximum(np.fmax(as_output, as_input), 0.0) + 0.0  # which zero a maximum is, is not specified
+        repeating = np.maximum(np.fmax(as_output, as_input), 0.0) + 0.0  # which zero a maximum is, is not specified
         strength = power(numerator[:, lines])
         stronger = np.maximum(strength / _mean(strength), 1.0)
-        coherent = (_COHERENT**2 * stronger - 1) * np.maximum(found - _STEPS_MARGIN * steps, 0.0)
+        coherent = (_COHERENT**2 * stronger - 1) * np.maximum(repeating - _STEPS_MARGIN * steps, 0.0)
         known = np.isfinite(mean) & np.isfinite(noise)
         over = _over_noise(mean, noise, known)
-        variance = _share(over)[:, np.newaxis] * (found + coherent)
+        variance = _share(over)[:, np.newaxis] * (repeating + coherent)
         return Repeats(variance, over, np.count_nonzero(known, axis=1), moments.weights.dof)
 
 
@@ -141,13 +141,13 @@ def _over_noise(mean: Floats, noise: Floats, known: NDArray[np.bool_]) -> Floats
     ratio = np.divide(mean, smooth, out=np.full(mean.shape, np.inf), where=smooth > 0)
     if known.all():
         return np.asarray(ratio.mean(axis=1))
-    return np.array([row[at].mean() if at.any() else 0.0 for row, at in zip(ratio, known)])
+    return np.array([row[detected].mean() if detected.any() else 0.0 for row, detected in zip(ratio, known)])
 
 
 def _summed(rows: Floats) -> Floats:
     """Sum over five neighbouring detection lines, fewer at the ends."""
     padded = np.pad(rows, ((0, 0), (_SMOOTH // 2, _SMOOTH // 2)))
-    shifted = (padded[:, at : at + rows.shape[1]] for at in range(_SMOOTH))
+    shifted = (padded[:, offset : offset + rows.shape[1]] for offset in range(_SMOOTH))
     return np.asarray(sum(shifted, start=np.zeros_like(rows)))
 
 

@@ -129,11 +129,11 @@ def find_hum(signals: Mapping[str, Floats], rate_hz: float) -> list[Hum]:
             seconds=samples / rate_hz,
             seconds_min=SECONDS_MIN,
         )
-    found = _tones(signals, rate_hz, _PARTS)
+    tones = _tones(signals, rate_hz, _PARTS)
     parts = int(samples / rate_hz / _PART_S)
     if parts >= 2 * _PARTS:
-        found = _tones(signals, rate_hz, parts) | found  # thirds have the best frequency
-    return [found[multiple] for multiple in sorted(found)]
+        tones = _tones(signals, rate_hz, parts) | tones  # thirds have the best frequency
+    return [tones[multiple] for multiple in sorted(tones)]
 
 
 def disturbed_lines(tones: Sequence[Hum], lines: Lines) -> NDArray[np.bool_]:
@@ -153,15 +153,15 @@ def _tones(signals: Mapping[str, Floats], rate_hz: float, parts: int) -> dict[fl
     spectra = {name: _spectra(x, parts) for name, x in signals.items()}
     resolution_hz = rate_hz / (min(x.size for x in signals.values()) // parts)
     near = np.rint(_MULTIPLES / resolution_hz).astype(np.int64)
-    found = {}
+    hum = {}
     highest_hz = (rate_hz / 2 - (_LOBE + 1) * resolution_hz) / (1 + _REACH)
     for f in _MULTIPLES[highest_hz > _MULTIPLES].tolist():
         turn = 2 * np.pi * _DRIFT * f / resolution_hz**2
         tones = {name: tone for name, x in spectra.items() if (tone := _tone(x, f / resolution_hz, near, turn))}
         if tones:
             bins = max(tones.values(), key=lambda tone: tone[1])[0]
-            found[f] = Hum(bins * resolution_hz, {name: amplitude for name, (_, amplitude) in tones.items()})
-    return found
+            hum[f] = Hum(bins * resolution_hz, {name: amplitude for name, (_, amplitude) in tones.items()})
+    return hum
 
 
 def _spectra(x: Floats, count: int) -> Complex:
@@ -183,15 +183,15 @@ def _tone(spectra: Complex, expected: float, multiples: NDArray[np.int64], turn:
     power = np.abs(spectra) ** 2
     mean, reach = power.mean(axis=0), max(1, round(_REACH * expected))
     first = max(round(expected) - reach, 1)
-    at = first + int(np.argmax(mean[first : round(expected) + reach + 1]))
-    lobe = np.arange(max(at - _LOBE, 1), min(at + _LOBE, mean.size - 1) + 1)
-    if mean[at] < mean[lobe].max():
+    peak = first + int(np.argmax(mean[first : round(expected) + reach + 1]))
+    lobe = np.arange(max(peak - _LOBE, 1), min(peak + _LOBE, mean.size - 1) + 1)
+    if mean[peak] < mean[lobe].max():
         return None  # the flank of another tone
-    beside = at + _BESIDE
+    beside = peak + _BESIDE
     beside = beside[(beside > 0) & (beside < mean.size)]
-    others = multiples[np.abs(multiples - at) > _LOBE + reach]
+    others = multiples[np.abs(multiples - peak) > _LOBE + reach]
     beside = beside[np.abs(beside[:, np.newaxis] - others).min(axis=1, initial=mean.size) > _LOBE]
-    if beside.size < _BESIDE.size // 2 or mean[at] <= prominence(beside.size // 2) * mean[beside].mean():
+    if beside.size < _BESIDE.size // 2 or mean[peak] <= prominence(beside.size // 2) * mean[beside].mean():
         return None
     place = float(np.average(lobe, weights=mean[lobe]))
     if abs(place - expected) > _REACH * expected + _OFF:
@@ -200,7 +200,7 @@ def _tone(spectra: Complex, expected: float, multiples: NDArray[np.int64], turn:
     noise = float(np.sqrt(mean[beside].mean() / of_part.mean()))
     lowest = of_part.min() / of_part.max() + _noise(len(power)) * noise
     if lowest < STEADY and (
-        lowest < _WANDER or _curvature(spectra[:, at]) > min(turn, _TURN_MAX) + 1.5 * _NOISE * noise
+        lowest < _WANDER or _curvature(spectra[:, peak]) > min(turn, _TURN_MAX) + 1.5 * _NOISE * noise
     ):
         return None
     return place, float(np.sqrt(of_part.mean()))

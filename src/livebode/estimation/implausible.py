@@ -37,11 +37,11 @@ class PlausibleRange(StatefulBase):
 
         `sizes` are those of the same data, where they are known.
         """
-        found = self._found(data, self.sizes(data) if sizes is None else sizes)
+        pieces = self._found(data, self.sizes(data) if sizes is None else sizes)
         self._at = (self._at + data.shape[1]) % self._window
         if self._at == 0:
             self._end_period()
-        return np.concatenate(found) if found else _NONE
+        return np.concatenate(pieces) if pieces else _NONE
 
     @staticmethod
     def are_plausible(ranges: Sequence[PlausibleRange], size: Floats) -> tuple[NDArray[np.bool_], Floats]:
@@ -50,21 +50,21 @@ class PlausibleRange(StatefulBase):
 
         No range changes.
         """
-        every = np.maximum(np.array([one._largest for one in ranges]), size)
-        limits = np.array([one._limit for one in ranges])
+        every = np.maximum(np.array([own._largest for own in ranges]), size)
+        limits = np.array([own._limit for own in ranges])
         return np.asarray(~(every > limits).any(axis=1)), every
 
     @staticmethod
     def process_each(ranges: Sequence[PlausibleRange], every: Floats) -> None:
         """Continue ranges of one length with a plausible sample each, as `process` would."""
-        for one, largest, limit in zip(ranges, every, _limits(every)):
-            one._at += 1
-            if one._at == one._window:
-                one._at = 0
-                one._largest.fill(0.0)
-                one._limit[:] = limit
+        for own, largest, limit in zip(ranges, every, _limits(every)):
+            own._at += 1
+            if own._at == own._window:
+                own._at = 0
+                own._largest.fill(0.0)
+                own._limit[:] = limit
             else:
-                one._largest[:] = largest
+                own._largest[:] = largest
 
     def _found(self, data: Floats, every: Floats) -> list[NDArray[np.intp]]:
         """Implausible samples, in pieces that begin a period, or continue the one that has begun."""
@@ -74,7 +74,7 @@ class PlausibleRange(StatefulBase):
         if not (every > limits).any():  # nearly always
             self._largest, self._limit = every[:, -1].copy(), limits[:, -1].copy()
             return []
-        found: list[NDArray[np.intp]] = []
+        pieces: list[NDArray[np.intp]] = []
         for i, largest in enumerate(every.T):
             if i > 0:
                 self._end_period()
@@ -82,10 +82,10 @@ class PlausibleRange(StatefulBase):
                 start = i * self._window - self._at
                 piece = np.abs(data[:, max(start, 0) : start + self._window])
                 wrong = piece > self._limit[:, np.newaxis]
-                found.append(max(start, 0) + np.flatnonzero(wrong.any(axis=0)))
+                pieces.append(max(start, 0) + np.flatnonzero(wrong.any(axis=0)))
                 largest = np.max(piece, axis=1, where=~wrong, initial=0.0)
             self._largest = np.maximum(self._largest, largest)
-        return found
+        return pieces
 
     def _end_period(self) -> None:
         self._limit = _limits(self._largest)

@@ -25,10 +25,10 @@ class LineEstimates:
     valid: Flags
 
     @classmethod
-    def of(cls, found: LineRows) -> LineEstimates:
-        """Those of the kernel."""
-        coherence = found.coherence, found.input_coherence
-        return cls(found.value, found.sigma, *coherence, found.weight, found.distortion, found.valid)
+    def of(cls, rows: LineRows) -> LineEstimates:
+        """Estimates of the kernel."""
+        coherence = rows.coherence, rows.input_coherence
+        return cls(rows.value, rows.sigma, *coherence, rows.weight, rows.distortion, rows.valid)
 
     def with_ripple(self, ripple: Floats, input_power: Floats) -> LineEstimates:
         """With the share of a ripple that is added to an input of this power."""

@@ -98,13 +98,13 @@ def _solved(triangle: Complex, information: Complex, weights: Floats, power: Flo
     """Quotient of the parabolas' values at the line, from the triangular factor of [regression, signals]."""
     # A window whose squares overflow has no quotient.
     triangle = np.where(np.isfinite(triangle).all(axis=(1, 2), keepdims=True), triangle, 0.0)
-    left, right, rest = triangle[:, :_COUNT, :_COUNT], triangle[:, :_COUNT, _COUNT:], triangle[:, _COUNT:, _COUNT:]
+    left, right, residual = triangle[:, :_COUNT, :_COUNT], triangle[:, :_COUNT, _COUNT:], triangle[:, _COUNT:, _COUNT:]
     u, size, v = np.linalg.svd(left)
     used = size > _RANK * size[:, :1]
     share = np.divide(1.0, size, out=np.zeros_like(size), where=used & (size > 0))
     inverse = (_adjoint(v) * share[:, np.newaxis]) @ _adjoint(u)
     coefficients = inverse @ right
-    rest = np.concatenate([right - left @ coefficients, rest], axis=1)
+    residual = np.concatenate([right - left @ coefficients, residual], axis=1)
     root = inverse @ _adjoint(inverse)  # of the covariance of the coefficients, for windows of equal weight
     spread = root @ information
     variance = (spread @ root)[:, 0, 0].real
@@ -115,7 +115,7 @@ def _solved(triangle: Complex, information: Complex, weights: Floats, power: Flo
     gains = coefficients[:, 0].T
     return Quotient(
         gains=np.where(seen, gains, complex(np.nan, np.nan)),
-        rest=rest / np.sqrt(free)[:, np.newaxis, np.newaxis],
+        residual=residual / np.sqrt(free)[:, np.newaxis, np.newaxis],
         variance=variance,
         dof=float(dof[seen].min()) if seen.any() else np.nan,
         power=power,

@@ -36,21 +36,21 @@ class Mains:
     """
 
     def __init__(self, lines: Lines) -> None:
-        at, highest = np.asarray(lines.bins), (lines.window - 1) // 2
-        self.lines = np.zeros((len(MAINS_HZ), len(at)), dtype=np.bool_)
+        bins, highest = np.asarray(lines.bins), (lines.window - 1) // 2
+        self.lines = np.zeros((len(MAINS_HZ), len(bins)), dtype=np.bool_)
         free = []
         for i, mains_hz in enumerate(MAINS_HZ):
-            self.lines[i] = np.isin(at, _on_bins(mains_hz, lines, highest))
-            tones = np.setdiff1d(_on_bins(mains_hz, lines, HARMONICS), at)
+            self.lines[i] = np.isin(bins, _on_bins(mains_hz, lines, highest))
+            tones = np.setdiff1d(_on_bins(mains_hz, lines, HARMONICS), bins)
             free.append(tones if self.lines[i].any() else tones[:0])
         self._any = np.asarray(self.lines.any(axis=0))
         # Distortion is at multiples of the lines' common divisor, and of odd lines at odd or at even ones alone:
         # at these distances it is like that at the harmonic.
         distances = _BESIDE * int(np.lcm(2, gcd(*lines.bins)))
-        barred = np.concatenate([at, *free])
+        barred = np.concatenate([bins, *free])
         self.free = [Neighbours(tones, distances, barred, highest) for tones in free]
         barred = np.concatenate(free)
-        self.excited = Neighbours(at if self._any.any() else at[:0], 2 * _BESIDE, barred, highest)
+        self.excited = Neighbours(bins if self._any.any() else bins[:0], 2 * _BESIDE, barred, highest)
         groups = [*self.free, self.excited]
         self.bins = np.unique(np.concatenate([group.bins for group in groups]))
         for group in groups:
@@ -65,8 +65,8 @@ class Mains:
         if not self.any:
             return np.zeros((len(output), self._any.size), dtype=np.bool_)
         least = _MATTERS * output[:, self.excited.tones].max(axis=1, keepdims=True)
-        found = [(group.stand_out(output) & (output[:, group.tones] > least)).any(axis=1) for group in self.free]
-        return np.asarray((self.lines & np.array(found).T[:, :, np.newaxis]).any(axis=1))
+        stands_out = [(group.stand_out(output) & (output[:, group.tones] > least)).any(axis=1) for group in self.free]
+        return np.asarray((self.lines & np.array(stands_out).T[:, :, np.newaxis]).any(axis=1))
 
     def alone(self, output: Floats) -> tuple[Floats, NDArray[np.bool_]]:
         """In a period without excitation: the power at each line, and whether it is that of a tone there.

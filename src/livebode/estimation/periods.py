@@ -72,16 +72,16 @@ class PeriodCutter(StatefulBase):
         left_out
             Indices of the samples without which a period does not count.
         """
-        window, at, samples = self._window, self._at, data.shape[1]
-        count = (at + samples) // window
+        window, offset, samples = self._window, self._at, data.shape[1]
+        count = (offset + samples) // window
         complete = np.ones(count + 1, dtype=np.bool_)
         complete[0] = self._whole
         if left_out.size:
-            complete[(at + left_out) // window] = False
+            complete[(offset + left_out) // window] = False
         together = max(1, _TOGETHER // window)
         for first in range(0, count, together):
             last = min(count, first + together)
-            begin, end = first * window - at, last * window - at
+            begin, end = first * window - offset, last * window - offset
             signals, position = self._signals(data, begin, end), self._positions(schedule, begin, end)
             yield Periods(
                 self._differences(signals).reshape(len(data), last - first, window),
@@ -94,11 +94,11 @@ class PeriodCutter(StatefulBase):
                 self._samples[:, 0] = self._samples[:, -1]
                 if position is not None:
                     self._position[:] = position[-window:]
-        rest, at = (samples, at) if not count else ((at + samples) % window, 0)
-        self._samples[:, at + 1 : at + 1 + rest] = data[:, samples - rest :]
+        remainder, offset = (samples, offset) if not count else ((offset + samples) % window, 0)
+        self._samples[:, offset + 1 : offset + 1 + remainder] = data[:, samples - remainder :]
         if schedule is not None:
-            self._position[at : at + rest] = schedule[samples - rest :]
-        self._at, self._whole = at + rest, bool(complete[count])
+            self._position[offset : offset + remainder] = schedule[samples - remainder :]
+        self._at, self._whole = offset + remainder, bool(complete[count])
 
     def _signals(self, data: Floats, begin: int, end: int) -> Floats:
         """Samples from `begin` on, which may be before the data, with the one before them where it is needed."""

@@ -17,7 +17,7 @@ class Quotient:
     ----------
     gains
         Response of each signal to the reference, shape (signals, lines); NaN where it cannot be determined.
-    rest
+    residual
         Factor F of the noise in the signals' spectra, shape (lines, any, signals): the noise of Σ a_i·S_i has the
         variance |F·a|².
     variance
@@ -29,14 +29,14 @@ class Quotient:
     """
 
     gains: Complex
-    rest: Complex
+    residual: Complex
     variance: Floats
     dof: float
     power: Floats
 
     def noise(self, weights: Complex) -> Floats:
         """Power of the noise in Σ a_i·S_i, shape (lines,); `weights` has the shape (signals, lines)."""
-        return np.asarray(np.sum(np.abs(np.einsum("krs,sk->kr", self.rest, weights)) ** 2, axis=1))
+        return np.asarray(np.sum(np.abs(np.einsum("krs,sk->kr", self.residual, weights)) ** 2, axis=1))
 
 
 def triangular(equations: Complex) -> Complex:

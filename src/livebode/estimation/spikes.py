@@ -53,28 +53,28 @@ class SpikeGate(StatefulBase):
     def process(self, data: Floats) -> NDArray[np.intp]:
         """Positions in `data` (channels, samples) of samples that are spikes in any watched channel."""
         data = data[self._watched]
-        found = np.zeros(data.shape[1], dtype=np.bool_)
+        spikes = np.zeros(data.shape[1], dtype=np.bool_)
         window = self._past.shape[2]
         done = 0
-        while done < found.size:
-            n = min(found.size - done, window - self._at)
-            found[done : done + n] = self._within_period(data[:, done : done + n])
+        while done < spikes.size:
+            n = min(spikes.size - done, window - self._at)
+            spikes[done : done + n] = self._within_period(data[:, done : done + n])
             done += n
             if self._at == window:
                 self._end_period()
-        return np.flatnonzero(found)
+        return np.flatnonzero(spikes)
 
     def _within_period(self, data: Floats) -> NDArray[np.bool_]:
-        at = slice(self._at, self._at + data.shape[1])
-        self._at = at.stop
+        places = slice(self._at, self._at + data.shape[1])
+        self._at = places.stop
         known = min(self._periods, _COMPARED)
-        expected = np.median(self._past[:known, :, at], axis=0) if known else data
+        expected = np.median(self._past[:known, :, places], axis=0) if known else data
         difference = np.abs(data - expected)
         spike = difference > self._limit[:, np.newaxis]
         self._difference = np.maximum(self._difference, difference.max(axis=1))
         self._size = np.maximum(self._size, np.abs(expected).max(axis=1))
         # A spike does not become part of the reference for later periods.
-        self._past[self._periods % _COMPARED][:, at] = np.where(spike, expected, data)
+        self._past[self._periods % _COMPARED][:, places] = np.where(spike, expected, data)
         return np.asarray(spike.any(axis=0))
 
     def _end_period(self) -> None:

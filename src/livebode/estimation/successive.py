@@ -53,8 +53,8 @@ class SuccessiveTrackers(StatefulBase):
         """Results of the newest recording, with the lines that are invalid in any of them."""
         each = [tracker.found() for tracker in self._begun]
         reasons: dict[str, set[float]] = {}
-        for found in each:
-            for kind, frequency_hz in found["judged"].get("invalid_lines_hz", {}).items():
+        for result in each:
+            for kind, frequency_hz in result["judged"].get("invalid_lines_hz", {}).items():
                 reasons.setdefault(kind, set()).update(frequency_hz)
         judged = each[-1]["judged"] | {"invalid_lines_hz": {kind: sorted(f) for kind, f in reasons.items()}}
         return each[-1] | {"judged": judged}

@@ -111,8 +111,8 @@ class Tracker(StreamEstimator[InputStatistics]):
 
     def found(self) -> dict[str, Any]:
         """The basis of the responses as plain data for a record, and the lines that are invalid, with the reason."""
-        found = super().found()
-        return found | {"judged": found["judged"] | (self._repeating.judged() if self._repeating else {})}
+        result = super().found()
+        return result | {"judged": result["judged"] | (self._repeating.judged() if self._repeating else {})}
 
     def _checked_for_spikes(self) -> NDArray[np.bool_]:
         return np.array([self.settings.channel(role) in self.settings.spikes for role in self._roles])
@@ -173,8 +173,8 @@ class Tracker(StreamEstimator[InputStatistics]):
         centre[1] = self._centre.at(schedule, rows.sample - block.start)
         repeating = None
         if self._repeating is not None:
-            at = positions(self._aside, block.start, block.stop)
-            repeating = self._repeating.process(channels, rows, schedule, block, at)
+            excluded = positions(self._aside, block.start, block.stop)
+            repeating = self._repeating.process(channels, rows, schedule, block, excluded)
         place = (rows.sample + 1) % s.lines.window
         ripple = None
         if self._speed is not None and schedule is not None:

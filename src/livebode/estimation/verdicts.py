@@ -55,10 +55,12 @@ class Verdict:
         return cls(np.full(lines, np.nan), np.zeros((REASONS, lines), dtype=np.bool_))
 
 
-def reason(found: PeriodVerdicts, period: int, kind: int, at: int, f: float, output: QuantityKind | None) -> Reason:
+def reason(
+    verdicts: PeriodVerdicts, period: int, kind: int, line: int, f: float, output: QuantityKind | None
+) -> Reason:
     """Why the line with this number and frequency is invalid since a period: for a message, and its details."""
     if KINDS[kind] == "steps":
-        counts = float(found.steps[period, at])
+        counts = float(verdicts.steps[period, line])
         message = Message(
             "the output moves only {steps:.2g} steps of its sensor at {line_hz:g} Hz: increase the excitation",
             steps=counts,
@@ -67,8 +69,8 @@ def reason(found: PeriodVerdicts, period: int, kind: int, at: int, f: float, out
         if output == "other":
             message = Message("{few}; if the output is a velocity, declare it in source.kinds", few=message)
         return message, {"steps": counts}
-    numerator, denominator = found.pair[period, :, at]
-    share = float(found.distortion[period + 1, at] / np.abs(numerator / denominator))
+    numerator, denominator = verdicts.pair[period, :, line]
+    share = float(verdicts.distortion[period + 1, line] / np.abs(numerator / denominator))
     message = Message(
         "distortion may be {percent:.0f}% of the response at {line_hz:g} Hz (friction, backlash or sensor steps; "
         "increase the excitation, or move the axis)",

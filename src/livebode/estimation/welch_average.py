@@ -42,7 +42,7 @@ class WelchAverage(StatefulBase):
 
         `samples` is the stretch of the reference and of the signals, shape (1 + signals, WINDOWS·window).
         """
-        windows = np.stack([samples[:, at : at + self._window] for at in self._starts])
+        windows = np.stack([samples[:, start : start + self._window] for start in self._starts])
         tapered = (windows - windows.mean(axis=-1, keepdims=True)) * self._taper
         equations = np.moveaxis(np.fft.rfft(tapered)[..., self._bins], -1, 0)  # (lines, windows, 1 + signals)
         weights = np.ones(2)
@@ -61,7 +61,7 @@ class WelchAverage(StatefulBase):
         with np.errstate(divide="ignore", invalid="ignore"):
             return Quotient(
                 gains=(triangle[:, 0, 1:] / triangle[:, 0, :1]).T,
-                rest=triangle[:, 1:, 1:] * np.sqrt(independent / (count * (independent - 1))),
+                residual=triangle[:, 1:, 1:] * np.sqrt(independent / (count * (independent - 1))),
                 variance=1 / (independent * power),
                 dof=float(independent - 1),
                 power=power,

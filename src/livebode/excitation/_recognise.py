@@ -154,21 +154,21 @@ def recognise(
         replies, also = _periods(answer[view], period, roughly)
         strange = strange | also
     steady = ~strange if np.sum(~strange) >= 2 else np.ones(len(blocks), dtype=np.bool_)
-    found = separate_hum(find_lines(spectra(blocks[steady]), floor_db, gap_db, step), rate_hz / period)
-    found = with_lines_beside(found, rate_hz / period)
+    classes = separate_hum(find_lines(spectra(blocks[steady]), floor_db, gap_db, step), rate_hz / period)
+    classes = with_lines_beside(classes, rate_hz / period)
     ratio_db = None if replies is None else snr_db(spectra(replies[steady]))
     if ratio_db is not None:
-        found = without_junk(found, ratio_db)
+        classes = without_junk(classes, ratio_db)
     if not doubtful:
-        refuse_if_doubtful(found, period, rate_hz)
-    if not found.excited.any():
+        refuse_if_doubtful(classes, period, rate_hz)
+    if not classes.excited.any():
         raise _no_line(period, len(blocks))
     peak, rms = peak_and_rms(blocks[steady].mean(axis=0))
     ahead = leading(strange)
     return Excitation(
-        lines=_lines(found, period, rate_hz),
-        amplitude=found.amplitude[found.excited],
-        distortion=_numbers(found.distortion),
+        lines=_lines(classes, period, rate_hz),
+        amplitude=classes.amplitude[classes.excited],
+        distortion=_numbers(classes.distortion),
         rms=rms,
         peak=peak,
         periods=len(blocks),
@@ -177,7 +177,7 @@ def recognise(
         transient=tuple(range(ahead)),
         outlying=tuple(m for m in _numbers(strange) if m >= ahead),
         slips=slips,
-        snr_db=None if ratio_db is None else ratio_db[found.excited],
+        snr_db=None if ratio_db is None else ratio_db[classes.excited],
     )
 
 
@@ -216,10 +216,10 @@ def lines_of_window(excitation: ArrayLike, window: int, rate_hz: float) -> Lines
             window=window,
         )
     start, stop = extent(clipped(x), window)
-    found = find_lines(spectra(cut(clipped(x[start:stop]), window)), step=step_of(x))
-    if not found.excited.any():
+    classes = find_lines(spectra(cut(clipped(x[start:stop]), window)), step=step_of(x))
+    if not classes.excited.any():
         raise _no_line(window, x.size // window)
-    return _lines(found, window, rate_hz)
+    return _lines(classes, window, rate_hz)
 
 
 def _no_line(period: int, periods: int) -> SignalError:
@@ -268,9 +268,9 @@ def _periods(samples: Floats, period: int, lines: Flags) -> tuple[Floats, Flags]
     return blocks, strange
 
 
-def _lines(found: BinClasses, period: int, rate_hz: float) -> Lines:
-    bins = _numbers(found.excited)
-    taken = found.excited | found.distortion
+def _lines(classes: BinClasses, period: int, rate_hz: float) -> Lines:
+    bins = _numbers(classes.excited)
+    taken = classes.excited | classes.distortion
     quiet = tuple(k for k in range(bins[0], bins[-1]) if not taken[k])
     return Lines(bins, period, rate_hz, quiet)
 

@@ -108,17 +108,17 @@ class _Norm:
 def _at(spectrum: Complex, bins: Bins, samples: int) -> Complex:
     """The spectrum of a real signal at any bin, also negative ones and those above the half, shape (starts, *bins)."""
     folded = np.abs(np.where(bins > samples // 2, bins - samples, bins))
-    found = spectrum[:, folded]
-    return np.where((bins < 0) | (bins > samples // 2), found.conj(), found)
+    values = spectrum[:, folded]
+    return np.where((bins < 0) | (bins > samples // 2), values.conj(), values)
 
 
 def descend(phases: Floats, bins: Bins, amplitude: Floats, stages: Stages) -> Floats:
-    """The same from one start, shape (lines,), by L-BFGS: for so many lines that a Hessian would take too long."""
+    """Phases from one start, shape (lines,), by L-BFGS: for so many lines that a Hessian would take too long."""
     with needing("SciPy", "analysis", f"a design of {bins.size} lines"):
         from scipy.optimize import minimize  # a third of a second to import
 
-    def norm(at: Floats, p: int, samples: int) -> tuple[float, Floats]:
-        lines = amplitude * np.exp(1j * at)
+    def norm(angles: Floats, p: int, samples: int) -> tuple[float, Floats]:
+        lines = amplitude * np.exp(1j * angles)
         x = period(bins, lines, samples)
         peak = np.max(np.abs(x))
         x /= peak

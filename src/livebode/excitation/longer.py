@@ -53,8 +53,8 @@ def _multiple(x: Floats, period: int, rate_hz: float, d: Floats) -> int:
     lag = int(lags[np.argmax(d[lags] <= 2 * max(float(d[lags].min()), 0.0) + ROUNDING)])
     if 2 * max(float(d[lag]), 0.0) + ROUNDING >= d[period]:
         return period
-    found = with_lines_beside(find_lines(spectra(cut(x, lag))), rate_hz / lag)
-    lines = np.flatnonzero(found.excited)
+    classes = with_lines_beside(find_lines(spectra(cut(x, lag))), rate_hz / lag)
+    lines = np.flatnonzero(classes.excited)
     common = gcd(lag, *map(int, lines))
     return lag // common if lines.size and lag // common > period else period
 

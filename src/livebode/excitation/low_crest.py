@@ -87,8 +87,8 @@ def _starts_for(k: Bins) -> int:
     return min(many, max(1, _STARTS_TIMES_SAMPLES // samples_for(int(k[-1]), VALLEY[-1][1])))
 
 
-def _first(found: tuple[float, Floats]) -> float:
-    return found[0]
+def _first(result: tuple[float, Floats]) -> float:
+    return result[0]
 
 
 def _descended(begun: Floats, k: Bins, size: Floats, stages: Stages) -> list[tuple[float, Floats]]:
@@ -157,5 +157,5 @@ def _reduced(bins: ArrayLike, amplitude: ArrayLike) -> tuple[Bins, Floats]:
 
 
 def _crest(k: Bins, size: Floats, phases: Floats) -> float:
-    one = period(k, size * np.exp(1j * phases), samples_for(int(k[-1]), _OVERSAMPLED))
-    return float(np.max(np.abs(one)) / np.sqrt(np.sum(size**2) / 2))
+    samples = period(k, size * np.exp(1j * phases), samples_for(int(k[-1]), _OVERSAMPLED))
+    return float(np.max(np.abs(samples)) / np.sqrt(np.sum(size**2) / 2))

@@ -198,15 +198,15 @@ def _too_short(flat: Floats, d: Floats, period: int) -> SignalError | None:
     if longest <= half + 1:
         return None
     lag = half + 1 + int(np.argmin(d[half + 1 : longest]))
-    rest = flat.size - lag
+    overlap = flat.size - lag
     # Further below the best shorter lag than noise in the shorter overlap explains: F with (rest, rest) degrees.
-    if d[lag] * (1 + _SIGMAS * 2 / np.sqrt(rest)) > (d[period] if period else 1.0) or d[lag] > 0.5:
+    if d[lag] * (1 + _SIGMAS * 2 / np.sqrt(overlap)) > (d[period] if period else 1.0) or d[lag] > 0.5:
         return None
     # A multiple of the period, with an error of half a sample each, is not new.
     if period and abs(lag - period * round(lag / period)) <= min(1 + lag // (2 * period), period // 4):
         return None
-    pair = np.concatenate((flat[:rest], flat[lag:]))
-    if log_chance(pair, rest) + np.log(flat.size) > np.log(FALSE_ALARM):
+    pair = np.concatenate((flat[:overlap], flat[lag:]))
+    if log_chance(pair, overlap) + np.log(flat.size) > np.log(FALSE_ALARM):
         return None
     return SignalError(
         "too-short",

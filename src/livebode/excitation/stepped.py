@@ -36,7 +36,7 @@ def stepped_sine(lines: Lines, amplitude: ArrayLike = 1.0, *, periods: int = 4) 
 
 
 def stepped_lines(lines: Lines, *, periods: int = 4) -> Lines:
-    """The same frequencies on the grid of the whole sequence."""
+    """Lines of these frequencies on the grid of the whole sequence."""
     if periods < 1:
         raise UsageError(
             "out-of-range",

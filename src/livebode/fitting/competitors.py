@@ -12,7 +12,7 @@ from livebode.arrays import Complex, Floats
 from livebode.core import OK
 from livebode.fitting.extended_model import BEYOND, LAG, MODE, RESIDUAL, START_DAMPING, ExtendedModel
 from livebode.fitting.physical import DELAY, PhysicalModel
-from livebode.fitting.problem import Measured, Problem
+from livebode.fitting.problem import MeasuredRows, Problem
 from livebode.fitting.rows import FittedRows, fit_rows
 from livebode.fitting.weights import misfit, weights
 
@@ -53,7 +53,7 @@ class AllowedChanges:
     top_hz: float
 
 
-def compete(start: Competitor, measured: Measured, noise_dof: Floats, allowed: AllowedChanges) -> list[Competitor]:
+def compete(start: Competitor, measured: MeasuredRows, noise_dof: Floats, allowed: AllowedChanges) -> list[Competitor]:
     """The model that explains one row best, then all others that were fitted.
 
     Starting with the specified model, the best of all models that differ by one step is selected as long as the cost
@@ -61,9 +61,9 @@ def compete(start: Competitor, measured: Measured, noise_dof: Floats, allowed: A
     """
     every, best = [start], start
     for _ in range(_TAKEN):
-        found = list(_rivals(best, measured, noise_dof, allowed))
-        every += found
-        better = min([best, *found], key=lambda c: c.cost)
+        rivals = list(_rivals(best, measured, noise_dof, allowed))
+        every += rivals
+        better = min([best, *rivals], key=lambda c: c.cost)
         if better is best:
             break
         best = better
@@ -74,7 +74,7 @@ def compete(start: Competitor, measured: Measured, noise_dof: Floats, allowed: A
 
 
 def competitor(
-    problem: Problem, measured: Measured, noise_dof: Floats, fitted: FittedRows, taken: tuple[str, ...] = ()
+    problem: Problem, measured: MeasuredRows, noise_dof: Floats, fitted: FittedRows, taken: tuple[str, ...] = ()
 ) -> Competitor:
     """A fit with its cost."""
     price = sum(_PRICE.get(name, _FRICTION_PRICE) for name in taken)
@@ -94,15 +94,15 @@ def mixed(every: list[Competitor]) -> Floats:
     it includes the differences between the models and the larger variance of a wider model.
     """
     best = every[0]
-    found = np.array(best.fitted.covariance[0])
+    total = np.array(best.fitted.covariance[0])
     names = best.problem.model.names
     for other in every[1:]:
         common = [name for name in names if name in other.problem.model.names]
         mine, theirs = ([c.problem.model.names.index(n) for n in common] for c in (best, other))
         apart = other.fitted.values[0, theirs] - best.fitted.values[0, mine]
         more = other.fitted.covariance[0][np.ix_(theirs, theirs)] - best.fitted.covariance[0][np.ix_(mine, mine)]
-        found[np.ix_(mine, mine)] += _weight(other, every) * (np.outer(apart, apart) + positive(more))
-    return found
+        total[np.ix_(mine, mine)] += _weight(other, every) * (np.outer(apart, apart) + positive(more))
+    return total
 
 
 def _weight(of: Competitor, every: list[Competitor]) -> float:
@@ -118,7 +118,7 @@ def positive(matrix: Floats) -> Floats:
     return np.asarray((vectors * values.clip(0)) @ vectors.T * np.outer(scale, scale))
 
 
-def _rivals(of: Competitor, measured: Measured, noise_dof: Floats, allowed: AllowedChanges) -> Iterator[Competitor]:
+def _rivals(of: Competitor, measured: MeasuredRows, noise_dof: Floats, allowed: AllowedChanges) -> Iterator[Competitor]:
     for name, problem, starts in _steps(of, measured, allowed):
         if 2 * np.count_nonzero(measured.use) <= problem.size:
             continue
@@ -128,7 +128,7 @@ def _rivals(of: Competitor, measured: Measured, noise_dof: Floats, allowed: Allo
             yield competitor(problem, measured, noise_dof, fitted, (*of.taken, name))
 
 
-def _less(of: Competitor, measured: Measured, noise_dof: Floats) -> Iterator[Competitor]:
+def _less(of: Competitor, measured: MeasuredRows, noise_dof: Floats) -> Iterator[Competitor]:
     """The competitor without one of its earlier additions, such as a delay that approximated a mode."""
     for i, name in enumerate(of.taken[:-1]):
         if name in of.problem.model.names and name not in of.problem.held and name not in (LAG, MODE, RESIDUAL):
@@ -138,30 +138,30 @@ def _less(of: Competitor, measured: Measured, noise_dof: Floats) -> Iterator[Com
                 yield competitor(problem, measured, noise_dof, fitted, of.taken[:i] + of.taken[i + 1 :])
 
 
-def _steps(of: Competitor, measured: Measured, allowed: AllowedChanges) -> Iterator[tuple[str, Problem, Floats]]:
+def _steps(of: Competitor, measured: MeasuredRows, allowed: AllowedChanges) -> Iterator[tuple[str, Problem, Floats]]:
     """Name, problem and starts (starts, parameters) of each."""
-    problem, at = of.problem, of.fitted.ended[0]
+    problem, values = of.problem, of.fitted.ended[0]
     for name in (DELAY, *problem.model.frictions):
         if name in problem.held and name not in allowed.fixed:
             wider = problem.variant(free=(name,))
-            begun = at if name == DELAY else _only(at, wider.model.shown(at, problem.grid), wider, name)
+            begun = values if name == DELAY else _only(values, wider.model.shown(values, problem.grid), wider, name)
             yield name, wider, begun[np.newaxis]
     model = problem.model
     base, extras = (model.base, model.extras) if isinstance(model, ExtendedModel) else (model, ())
     if LAG not in extras:
         lagging = ExtendedModel(base, (*extras, LAG), allowed.top_hz)
-        begun = _padded(lagging, problem.model, at)
+        begun = _padded(lagging, problem.model, values)
         yield LAG, problem.variant(lagging), begun[np.newaxis]
         if allowed.delay and DELAY in model.names and DELAY not in problem.held:
             instead = problem.variant(lagging, held={DELAY: 0.0})
-            late = max(float(at[model.names.index(DELAY)]), 1e-5)
+            late = max(float(values[model.names.index(DELAY)]), 1e-5)
             begun = instead.with_held(begun)
             begun[instead.model.names.index("lag")] = late
             yield LAG, instead, begun[np.newaxis]
     if hasattr(base, "output") and not {RESIDUAL, MODE} & set(extras):
         if BEYOND * allowed.top_hz < _NEAR_NYQUIST * problem.grid.rate_hz / 2:
             stiff = problem.variant(ExtendedModel(base, (*extras, RESIDUAL), allowed.top_hz))
-            yield RESIDUAL, stiff, _padded(stiff.model, model, at)[np.newaxis]
+            yield RESIDUAL, stiff, _padded(stiff.model, model, values)[np.newaxis]
         moving = problem.variant(ExtendedModel(base, (*extras, MODE), allowed.top_hz))
         starts = _mode_starts(moving, problem, measured, of.fitted)
         yield MODE, moving, starts
@@ -170,20 +170,20 @@ def _steps(of: Competitor, measured: Measured, allowed: AllowedChanges) -> Itera
         yield MODE, undamped, undamped.with_held(starts)
 
 
-def _only(at: Floats, shown: Floats, problem: Problem, name: str) -> Floats:
+def _only(values: Floats, shown: Floats, problem: Problem, name: str) -> Floats:
     """`at` with one parameter at the smallest value that the lines show."""
-    begun = problem.with_held(at)
+    begun = problem.with_held(values)
     begun[problem.model.names.index(name)] = shown[problem.model.names.index(name)]
     return begun
 
 
-def _padded(model: PhysicalModel, of: PhysicalModel, at: Floats) -> Floats:
+def _padded(model: PhysicalModel, of: PhysicalModel, values: Floats) -> Floats:
     """Values of a model as those of one with more parameters, the new ones at their start."""
-    known = dict(zip(of.names, at))
+    known = dict(zip(of.names, values))
     return np.array([known.get(p.name, p.start) for p in model.parameters])
 
 
-def _mode_starts(problem: Problem, of: Problem, measured: Measured, fitted: FittedRows) -> Floats:
+def _mode_starts(problem: Problem, of: Problem, measured: MeasuredRows, fitted: FittedRows) -> Floats:
     """Values with a further mode where it would lower chi² most to first order, (starts, parameters).
 
     For each frequency and damping the gain is the only new parameter, and linear: least squares together with the
@@ -193,7 +193,7 @@ def _mode_starts(problem: Problem, of: Problem, measured: Measured, fitted: Fitt
     weight = np.where(measured.use, weights(measured.sigma, np.abs(fitted.response), fitted.epsilon), 0.0)
     known, _ = of.solve(measured, weight, fitted.ended, 1)
     slope = _stacked((weight[..., np.newaxis] * known.slope)[0])
-    rest = _stacked((weight * np.where(measured.use, measured.value - fitted.response, 0.0))[0])
+    residual = _stacked((weight * np.where(measured.use, measured.value - fitted.response, 0.0))[0])
     basis = np.linalg.qr(slope)[0]
     high = min(_HIGHEST * grid.frequency_hz.max(), _NEAR_NYQUIST * grid.rate_hz / 2)
     frequency = np.geomspace(_LOWEST * grid.frequency_hz.min(), high, _MODES)
@@ -206,7 +206,7 @@ def _mode_starts(problem: Problem, of: Problem, measured: Measured, fitted: Fitt
     column = _stacked((weight * (problem.model.at(modes, grid) - fitted.response)).T)
     column = column - basis @ (basis.T @ column)
     power = np.sum(column**2, axis=0) + 1e-300
-    share = rest @ column / power
+    share = residual @ column / power
     gain = share**2 * power
     gain[(share < 0) & problem.model.parameters[-1].one_sided] = 0.0
     gain[_near_own(of, fitted.ended, modes[:, names.index("mode")])] = 0.0
@@ -227,14 +227,14 @@ def _stacked(values: Complex) -> Floats:
     return np.concatenate([values.real, values.imag])
 
 
-def _best_start(problem: Problem, measured: Measured, fitted: FittedRows, starts: Floats) -> Floats:
+def _best_start(problem: Problem, measured: MeasuredRows, fitted: FittedRows, starts: Floats) -> Floats:
     """One row, from the start with the least cost."""
     if len(starts) == 1:
         return starts
     weight = weights(measured.sigma, np.abs(fitted.response), fitted.epsilon)
     every = measured.repeated(len(starts))
-    found, cost = problem.solve(every, np.tile(weight, (len(starts), 1)), starts)
-    return found.values[[int(np.argmin(cost))]]
+    solutions, cost = problem.solve(every, np.tile(weight, (len(starts), 1)), starts)
+    return solutions.values[[int(np.argmin(cost))]]
 
 
 def _possible(problem: Problem, fitted: FittedRows, allowed: AllowedChanges) -> bool:

@@ -98,13 +98,13 @@ class ExtendedModel(PhysicalModel):
 
     def _modes(self, values: dict[str, Any]) -> list[tuple[Any, Any, Any]]:
         """ω, ζ and gain of each that is added."""
-        found: list[tuple[Any, Any, Any]] = []
+        modes: list[tuple[Any, Any, Any]] = []
         if RESIDUAL in self.extras:
             omega = 2 * np.pi * BEYOND * self.top_hz
-            found.append((omega, _BEYOND_DAMPING, values["residual_compliance"] * omega**2))
+            modes.append((omega, _BEYOND_DAMPING, values["residual_compliance"] * omega**2))
         if MODE in self.extras:
-            found.append((2 * np.pi * values["mode"], values["mode_damping"], values["mode_gain"]))
-        return found
+            modes.append((2 * np.pi * values["mode"], values["mode_damping"], values["mode_gain"]))
+        return modes
 
     @property
     def derived_names(self) -> tuple[str, ...]:
@@ -119,17 +119,19 @@ class ExtendedModel(PhysicalModel):
 
     def shown(self, values: Floats, grid: EvaluationGrid) -> Floats:
         own = len(self.base.names)
-        found = np.concatenate([self.base.shown(values[..., :own], grid), values[..., own:]], axis=-1)
+        visible = np.concatenate([self.base.shown(values[..., :own], grid), values[..., own:]], axis=-1)
         top = grid._replace(frequency_hz=np.array([self.top_hz]))
         position = 1 if getattr(self.base, "output", "velocity") == "velocity" else 0
         size = _SHOWN * np.abs(self.base.at(values[..., :own], top)[..., 0]) / (2 * np.pi * self.top_hz) ** position
         for name, scale in (("residual_compliance", 1.0), ("mode_gain", None)):
             if name in self.names:
                 square = scale or (2 * np.pi * values[..., self.names.index("mode")]) ** 2
-                found[..., self.names.index(name)] = size * square
-        return found
+                visible[..., self.names.index(name)] = size * square
+        return visible
 
     def starts(self, value: Complex, weight: Floats, grid: EvaluationGrid) -> Floats:
         first = self.base.starts(value, weight, grid)
-        rest = np.array([p.start for p in self.parameters[len(self.base.parameters) :]])
-        return self.shown(np.concatenate([first, np.broadcast_to(rest, (*first.shape[:-1], rest.size))], axis=-1), grid)
+        added = np.array([p.start for p in self.parameters[len(self.base.parameters) :]])
+        return self.shown(
+            np.concatenate([first, np.broadcast_to(added, (*first.shape[:-1], added.size))], axis=-1), grid
+        )

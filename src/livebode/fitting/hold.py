@@ -34,13 +34,13 @@ def to_discrete(transfer: Transfer, rate_hz: float, delay_s: float = 0.0) -> tup
             delay_s=float(delay_s),
         )
     poles = np.exp(transfer.poles() / rate_hz)
-    at = np.concatenate([poles, np.ones(transfer.integrators)])
+    places = np.concatenate([poles, np.ones(transfer.integrators)])
     ticks = delay_s * rate_hz
     late = int(np.floor(ticks)) + int(ticks != np.floor(ticks))
-    denominator = np.concatenate([np.poly(at).real, np.zeros(late)])
+    denominator = np.concatenate([np.poly(places).real, np.zeros(late)])
     # The numerator is a polynomial in z − 1, found from its values on a circle around 1, about as wide as the poles.
     count = len(denominator) - 1
-    around = _AROUND * min(max(np.max(np.abs(at - 1)), _NEAR), 2.0)
+    around = _AROUND * min(max(np.max(np.abs(places - 1)), _NEAR), 2.0)
     turn = np.exp(2j * np.pi * (np.arange(count) + 0.3) / count)
     values = transfer.sampled(1 + around * turn, rate_hz, delay_s) * np.polyval(denominator, 1 + around * turn)
     powers = (around * turn[:, np.newaxis]) ** np.arange(count)
@@ -76,13 +76,13 @@ def to_continuous(numerator: ArrayLike, denominator: ArrayLike, rate_hz: float) 
             numerator_degree=len(n) - 1,
             denominator_degree=len(d) - 1,
         )
-    at = roots(d)
-    resting = np.abs(at - 1) < np.sqrt(_AT_ONE)
+    places = roots(d)
+    resting = np.abs(places - 1) < np.sqrt(_AT_ONE)
     integrators = int(np.count_nonzero(resting))
     if integrators == 1:
-        resting = np.abs(at - 1) < _AT_ONE
+        resting = np.abs(places - 1) < _AT_ONE
         integrators = int(np.count_nonzero(resting))
-    moving = at[~resting]
+    moving = places[~resting]
     if np.any((moving.real <= 0) & (np.abs(moving.imag) < 1e-12 * np.abs(moving))):
         bad = moving[(moving.real <= 0) & (np.abs(moving.imag) < 1e-12 * np.abs(moving))][0].real
         raise FitError(
@@ -96,18 +96,18 @@ def to_continuous(numerator: ArrayLike, denominator: ArrayLike, rate_hz: float) 
     parts = _parts(n, d[0], moving, integrators)
     tick = 1 / rate_hz
     weights = parts[: len(moving)] / held[: len(moving)]
-    rest = parts[len(moving) :]
+    of_integrators = parts[len(moving) :]
     if integrators == 2:
-        double = rest[1] / tick**2
-        rest = np.array([(rest[0] - tick**2 / 2 * double) / tick, double])
+        double = of_integrators[1] / tick**2
+        of_integrators = np.array([(of_integrators[0] - tick**2 / 2 * double) / tick, double])
     elif integrators == 1:
-        rest = rest / tick
+        of_integrators = of_integrators / tick
     below = np.poly(np.concatenate([poles, np.zeros(integrators)]))
     above = np.zeros(len(below) - 1, dtype=np.complex128)
     for i, weight in enumerate(weights):
         others = np.concatenate([np.delete(poles, i), np.zeros(integrators)])
         above += weight * np.poly(others)
-    for i, weight in enumerate(rest):
+    for i, weight in enumerate(of_integrators):
         others = np.concatenate([poles, np.zeros(integrators - 1 - i)])
         above[len(above) - len(others) - 1 :] += weight * np.poly(others)
     return Transfer(above.real, np.asarray(np.poly(poles).real, dtype=np.float64), integrators)

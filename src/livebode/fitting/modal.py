@@ -30,8 +30,8 @@ def scan(
     f = grid.frequency_hz
     omegas = 2 * np.pi * np.geomspace(f.min() / 2, f.max() * 2, _SCANNED[modes])
     rigid = _part([1.0], [1.0] + [0.0] * integrators, grid)
-    rest = [0.0] * (integrators - 1)
-    shapes = [_part([1.0, 0.0], [1.0, w / QUALITY, w * w, *rest], grid) for w in omegas]
+    integrator_zeros = [0.0] * (integrators - 1)
+    shapes = [_part([1.0, 0.0], [1.0, w / QUALITY, w * w, *integrator_zeros], grid) for w in omegas]
     sets = np.array(list(combinations(range(len(omegas)), modes)), dtype=int)
     basis = np.array([[rigid, *(shapes[i] for i in chosen)] for chosen in sets])
     if ratio is not None:

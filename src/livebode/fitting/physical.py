@@ -246,7 +246,7 @@ def _paired(polynomial: Floats) -> tuple[Floats, Floats]:
     """
     if polynomial.shape[-1] == 3:
         return polynomial[..., 2:] / polynomial[..., :1], -polynomial[..., 1:2] / polynomial[..., :1]
-    found = roots(polynomial)
-    left = found.shape[-1] % 2
-    one, other = found[..., left::2], found[..., left + 1 :: 2]
-    return np.abs(one * other), (one + other).real
+    ordered = roots(polynomial)
+    left = ordered.shape[-1] % 2
+    first, second = ordered[..., left::2], ordered[..., left + 1 :: 2]
+    return np.abs(first * second), (first + second).real

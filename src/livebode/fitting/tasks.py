@@ -9,7 +9,7 @@ import numpy as np
 
 from livebode.arrays import Floats
 from livebode.core import Responses
-from livebode.fitting.problem import Measured, Problem
+from livebode.fitting.problem import MeasuredRows, Problem
 from livebode.fitting.rows import FittedRows, fit_rows
 
 
@@ -19,7 +19,7 @@ class FitTask(NamedTuple):
 
     responses: Responses
     problem: Problem
-    measured: Measured
+    measured: MeasuredRows
     noise_dof: Floats
     start: Floats | None
     epsilon: Floats | None
@@ -37,15 +37,15 @@ class FitTask(NamedTuple):
 def fitted_together(tasks: Sequence[FitTask]) -> list[FittedRows]:
     """The rows of each task; in NumPy, tasks of one kind are one computation."""
     kinds: dict[tuple[object, ...], list[int]] = {}
-    found: dict[int, FittedRows] = {}
+    rows: dict[int, FittedRows] = {}
     for i, task in enumerate(tasks):
         if task.problem.native is not None:  # to join the arrays would cost more than it saves
-            found[i] = task.fitted()
+            rows[i] = task.fitted()
         else:
             kinds.setdefault(task.kind, []).append(i)
     for members in kinds.values():
-        found.update(zip(members, _fitted_alike([tasks[i] for i in members])))
-    return [found[i] for i in range(len(tasks))]
+        rows.update(zip(members, _fitted_alike([tasks[i] for i in members])))
+    return [rows[i] for i in range(len(tasks))]
 
 
 def _fitted_alike(tasks: Sequence[FitTask]) -> list[FittedRows]:
@@ -54,7 +54,7 @@ def _fitted_alike(tasks: Sequence[FitTask]) -> list[FittedRows]:
         return [first.fitted()]
     start, epsilon = _joined([task.start for task in tasks]), _joined([task.epsilon for task in tasks])
     noise_dof = np.concatenate([task.noise_dof for task in tasks])
-    every = fit_rows(first.problem, Measured.join([task.measured for task in tasks]), noise_dof, start, epsilon)
+    every = fit_rows(first.problem, MeasuredRows.join([task.measured for task in tasks]), noise_dof, start, epsilon)
     ends = np.cumsum([len(task.noise_dof) for task in tasks])[:-1]
     return [FittedRows(*parts) for parts in zip(*(np.split(column, ends) for column in every))]
 

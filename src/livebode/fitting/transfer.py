@@ -71,7 +71,7 @@ class Transfer(NamedTuple):
         ticks = np.asarray(delay_s, dtype=np.float64) * rate_hz
         whole = np.floor(ticks)
         late = (ticks - whole)[..., np.newaxis, np.newaxis] if np.any(ticks) else None
-        found: Any = 0.0
+        response: Any = 0.0
         if self.denominator.shape[-1] > 1:
             poles = self.poles()
             poles[poles == 0] = _TINY**0.1  # a pole that friction hardly moves: equivalent to an integrator
@@ -84,21 +84,21 @@ class Transfer(NamedTuple):
             else:
                 soon = np.expm1(poles * (1 - late))
                 sampled *= soon + (end - soon) / z[..., np.newaxis, :]
-            found = (weights @ sampled)[..., 0, :]
+            response = (weights @ sampled)[..., 0, :]
         for order, weight in enumerate(self._at_rest(), 1):
-            found = found + weight[..., np.newaxis] * _integrated(order, z, tick, late)
+            response = response + weight[..., np.newaxis] * _integrated(order, z, tick, late)
         if np.any(whole):
-            found = found * z ** -whole[..., np.newaxis]
-        return np.asarray(found)
+            response = response * z ** -whole[..., np.newaxis]
+        return np.asarray(response)
 
     def poles(self) -> Complex:
         """Poles without the integrators, shape (..., poles); equal ones are moved apart by a hundred-thousandth."""
-        found = roots(self.denominator)
-        if found.shape[-1] == 2:
-            near = np.abs(found[..., 0] - found[..., 1]) < _APART * np.abs(found[..., 0])
+        poles = roots(self.denominator)
+        if poles.shape[-1] == 2:
+            near = np.abs(poles[..., 0] - poles[..., 1]) < _APART * np.abs(poles[..., 0])
             if near.any():
-                found[near] = found[near].mean(axis=-1, keepdims=True) * np.array([1 - _APART, 1 + _APART])
-        return found
+                poles[near] = poles[near].mean(axis=-1, keepdims=True) * np.array([1 - _APART, 1 + _APART])
+        return poles
 
     def zeros(self) -> Complex:
         """Shape (..., zeros)."""
@@ -144,21 +144,21 @@ def roots(polynomial: Floats) -> Complex:
     companion = np.zeros((*monic.shape[:-1], degree, degree))
     companion[..., 0, :] = -monic / scale**power
     companion[..., np.arange(1, degree), np.arange(degree - 1)] = 1.0
-    found = np.linalg.eigvals(np.where(np.isfinite(companion), companion, 0.0)) * scale
-    return _by_size(found)
+    poles = np.linalg.eigvals(np.where(np.isfinite(companion), companion, 0.0)) * scale
+    return _by_size(poles)
 
 
-def _by_size(found: Complex) -> Complex:
-    size = np.round(np.abs(found) / np.max(np.abs(found) + _TINY, axis=-1, keepdims=True), 9)
-    order = np.lexsort((found.imag, size))
-    return np.take_along_axis(found, order, axis=-1)
+def _by_size(values: Complex) -> Complex:
+    size = np.round(np.abs(values) / np.max(np.abs(values) + _TINY, axis=-1, keepdims=True), 9)
+    order = np.lexsort((values.imag, size))
+    return np.take_along_axis(values, order, axis=-1)
 
 
-def _valued(polynomial: Floats, at: Complex) -> Complex:
+def _valued(polynomial: Floats, places: Complex) -> Complex:
     """Values of polynomials (..., 1, degree + 1) at places (..., places), by Horner."""
     value: Any = polynomial[..., 0]
     for i in range(1, polynomial.shape[-1]):
-        value = value * at + polynomial[..., i]
+        value = value * places + polynomial[..., i]
     return np.asarray(value)
 
 

@@ -42,7 +42,7 @@ class ChangeAccuracy:
     def at_least(self, other: ChangeAccuracy) -> ChangeAccuracy:
         """The coarser of both in each component."""
         pairs = ((getattr(self, name), getattr(other, name)) for name in self.__dataclass_fields__)
-        return ChangeAccuracy(*(np.maximum(one, two) for one, two in pairs))
+        return ChangeAccuracy(*(np.maximum(own, others) for own, others in pairs))
 
     def widened(self, by: Floats | float) -> ChangeAccuracy:
         """With a further error of the baseline of this standard deviation, (components,)."""
@@ -61,8 +61,8 @@ def accuracy(score: Floats, information: Floats, smallest: Floats, off: Floats |
         inflation = np.maximum(inflation, _mean(sums**2) / np.maximum(_mean(total), 1e-300))
     sums, total = _batched(score, STRETCH), _batched(information, STRETCH)
     known = total > 0
-    rest = np.where(known, (sums / np.where(known, total, 1.0)) ** 2 - 1 / np.where(known, total, np.inf), 0.0)
-    scatter = np.hypot(np.sqrt(np.maximum(_mean(rest), 0.0)), _OFF * off)
+    excess = np.where(known, (sums / np.where(known, total, 1.0)) ** 2 - 1 / np.where(known, total, np.inf), 0.0)
+    scatter = np.hypot(np.sqrt(np.maximum(_mean(excess), 0.0)), _OFF * off)
     return ChangeAccuracy(inflation, scatter, np.maximum(smallest, _APART * scatter))
 
 

@@ -145,8 +145,8 @@ class ActiveAlarms(StatefulBase):
                     alarm.now = float(np.clip(alarm.score / alarm.information, -_MOST, _MOST))
                 places.append(replace(alarm.change.place, amount=alarm.now))
         self.offset = Offset(logarithms, tuple(places))
-        at = np.array([p.centre_m for p in places])
-        local = np.abs(self.offset.stiffness(at) - before.stiffness(at)).max() if places else 0.0
+        centres = np.array([p.centre_m for p in places])
+        local = np.abs(self.offset.stiffness(centres) - before.stiffness(centres)).max() if places else 0.0
         moved = np.abs(logarithms - before.logarithms).max()
         self._moving = bool(max(local, moved) > _MOVING)
         if moved > _MOVING:  # evidence around the old offset would pull the new one back
@@ -158,12 +158,12 @@ class ActiveAlarms(StatefulBase):
         inside = self._information[np.ix_(known, known)]
         if known and np.all(np.diagonal(inside) > 0):
             covariance = np.linalg.inv(inside)
-            found = covariance @ self._score[known]
+            amounts = covariance @ self._score[known]
             step = self._all_free() - self.offset.logarithms
             for i, j in enumerate(known):
                 accuracy = self._machine.held if len(known) == 1 else self._machine.free
                 for alarm in (a for a in self.alarms if a.change.direction == j and a.change.place is None):
-                    alarm.now = float(np.clip(found[i], -_MOST, _MOST))
+                    alarm.now = float(np.clip(amounts[i], -_MOST, _MOST))
                     alarm.bound = bound(accuracy, j, 1 / covariance[i, i])
                     if abs(alarm.now) > FAR:
                         alarm.bound = float(np.linalg.norm([alarm.bound, step[j], _neglected(step)]))
@@ -196,5 +196,5 @@ def _share(place: LocalChange, position_m: float) -> float:
     return float(place.share(np.array([position_m]))[0])
 
 
-def _same(one: LocalChange, other: LocalChange) -> bool:
-    return (one.centre_m, one.width_m) == (other.centre_m, other.width_m)
+def _same(first: LocalChange, second: LocalChange) -> bool:
+    return (first.centre_m, first.width_m) == (second.centre_m, second.width_m)

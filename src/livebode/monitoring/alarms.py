@@ -67,17 +67,17 @@ class Alarm:
         """Numbers of this alarm, for a snapshot."""
         earliest_s = np.nan if self.date.earliest_s is None else self.date.earliest_s
         date = [self.date.since_sample, self.date.since_s, earliest_s, self.date.latest_s]
-        rest = [*date, *self.way_m, self.now, self.bound, self.height, self.announced]
+        numbers = [*date, *self.way_m, self.now, self.bound, self.height, self.announced]
         sums = [self.score, self.information, self.reported, self.reported_bound]
-        return [*_numbers(self.change), *_numbers(self.rival), *rest, *sums]
+        return [*_numbers(self.change), *_numbers(self.rival), *numbers, *sums]
 
     @classmethod
     def of(cls, row: NDArray[Any]) -> Alarm:
         """From a snapshot's numbers."""
         change, rival = _change(row[:_NUMBERS]), _change(row[_NUMBERS : 2 * _NUMBERS])
         assert change is not None
-        sample, since_s, earliest_s, latest_s, *rest = (float(n) for n in row[2 * _NUMBERS :])
-        low, high, now, bound, height, announced, *sums = rest
+        sample, since_s, earliest_s, latest_s, *numbers = (float(n) for n in row[2 * _NUMBERS :])
+        low, high, now, bound, height, announced, *sums = numbers
         date = ChangeDate(int(sample), since_s, None if isnan(earliest_s) else earliest_s, latest_s)
         return cls(change, rival, date, (low, high), now, bound, height, bool(announced), *sums)
 

@@ -90,8 +90,8 @@ class Baseline:
 
     def __repr__(self) -> str:
         f, tables = self.lines.frequency_hz, [*self.tables, *(self.torque.tables if self.torque is not None else ())]
-        what = [table.what for table in tables]
-        learned = " and ".join([*what, "a model of the machine"] if self.machine is not None else what)
+        quantities = [table.what for table in tables]
+        learned = " and ".join([*quantities, "a model of the machine"] if self.machine is not None else quantities)
         span = f"{counted(len(f), 'line')}, {f[0]:g} … {f[-1]:g} Hz"
         return f"<Baseline: {learned}, {span}; learned from {counted(len(self.runs), 'run')}>"
 

@@ -73,12 +73,12 @@ def between_runs(parts: Sequence[Evidence], smallest: Floats) -> BetweenRuns | N
         return None
     windows = np.array([len(part) for part in parts])
     offset, scattered = np.array(offsets), np.concatenate(stretches)
-    rest, noise = offset - offset.mean(axis=0), scattered.T @ scattered / within
-    size, vectors = np.linalg.eigh(rest.T @ rest / degrees - noise * np.mean(1 / windows))
+    deviation, noise = offset - offset.mean(axis=0), scattered.T @ scattered / within
+    size, vectors = np.linalg.eigh(deviation.T @ deviation / degrees - noise * np.mean(1 / windows))
     along = vectors[:, -1] / np.abs(vectors[:, -1]).max()
     weighted = (offset - np.average(offset, axis=0, weights=windows)) @ along
     ratio = float(windows @ weighted**2 / np.sum((scattered @ along) ** 2))
-    variance = np.sum((rest @ along) ** 2) / degrees - along @ noise @ along * np.mean(1 / windows)
+    variance = np.sum((deviation @ along) ** 2) / degrees - along @ noise @ along * np.mean(1 / windows)
     spread = np.sqrt(max(variance, 0.0)) / (along @ along)
     if chance(ratio, degrees, within) > _FALSE or spread < _MATTERS or size[-1] <= 0:
         return None

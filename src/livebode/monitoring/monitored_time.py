@@ -183,15 +183,15 @@ class MonitoredTime(StatefulBase):
 
     def _by_name(self, values: NDArray[Any]) -> list[tuple[str, Any]]:
         """The largest value of each name: both parts of a line have one."""
-        found: dict[str, Any] = {}
+        largest: dict[str, Any] = {}
         for name, value in zip(self._names, values.tolist()):
-            found[name] = max(found.get(name, value), value)
-        return list(found.items())
+            largest[name] = max(largest.get(name, value), value)
+        return list(largest.items())
 
     def _not_monitored(self, missing: NDArray[np.bool_]) -> Event:
         reason, names = self._reason(missing), [name for name, lacks in self._by_name(missing) if lacks]
         sizes = self._percent(np.where(self._known, self._share * self.needed, 0.0))
-        found = {name: sizes[name] for name in names}
+        detectable = {name: sizes[name] for name in names}
         message = Message(
             "Not monitored since {since}: {parts} ({why}).",
             since=moment(self._begin_s),
@@ -200,20 +200,20 @@ class MonitoredTime(StatefulBase):
         )
         known = [
             Message("{part} from {percent:.2g} %", part=Message(name), percent=size)
-            for name, size in found.items()
+            for name, size in detectable.items()
             if size is not None
         ]
         if known:
             more = Message("Only larger changes are found: {changes}.", changes=_listed(known))
             message = Message.sentences([message, more])
         kind = "idle" if reason in _IDLE else "not-monitored"
-        details = {"what": names, "reason": reason, "since_s": self._begin_s, "detectable_percent": found}
+        details = {"what": names, "reason": reason, "since_s": self._begin_s, "detectable_percent": detectable}
         return Event(kind, self._sample, self._time_s, message, details)
 
     def _again(self) -> Event:
-        what = [name for name, told in self._by_name(self._told) if told]
+        again = [name for name, told in self._by_name(self._told) if told]
         message = Message("Monitored again since {at}.", at=moment(self._time_s))
-        return Event("monitored-again", self._sample, self._time_s, message, {"what": what})
+        return Event("monitored-again", self._sample, self._time_s, message, {"what": again})
 
 
 def _listed(parts: list[Message]) -> list[Message]:

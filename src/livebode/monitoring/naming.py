@@ -82,7 +82,7 @@ def candidates(segment: ScoredWindows, known: ChangeAccuracy, way_m: float, loca
     """
     score = segment.score.sum(axis=0)
     information = np.einsum("rjj->j", segment.information)
-    found = [
+    changes = [
         NamedChange(
             j, score[j] / information[j], bound(known, j, float(information[j])), score[j] ** 2 / (2 * information[j])
         )
@@ -90,8 +90,8 @@ def candidates(segment: ScoredWindows, known: ChangeAccuracy, way_m: float, loca
         if information[j] > 0
     ]
     if local and way_m > 0 and information[_STIFFNESS] > 0:
-        found.append(_place(segment, known, way_m))
-    return sorted(found, key=lambda change: -change.evidence)
+        changes.append(_place(segment, known, way_m))
+    return sorted(changes, key=lambda change: -change.evidence)
 
 
 def bound(known: ChangeAccuracy, direction: int, information: float) -> float:

@@ -27,8 +27,8 @@ class TorqueNoise:
     @classmethod
     def of(cls, windows: Sequence[OrderWindows]) -> TorqueNoise:
         """From windows of the healthy axis: the median over all orders, of which few are there, in bins."""
-        value = np.concatenate([one.value.ravel() for one in windows])
-        f = np.concatenate([one.frequency_hz.ravel() for one in windows])
+        value = np.concatenate([window.value.ravel() for window in windows])
+        f = np.concatenate([window.frequency_hz.ravel() for window in windows])
         known = np.isfinite(value) & (f > 0)
         f, square = f[known], np.abs(value[known]) ** 2
         order = np.argsort(f, kind="stable")
@@ -51,9 +51,9 @@ def powers(windows: Sequence[OrderWindows], noise: TorqueNoise) -> tuple[Floats,
     counts as noise. NaN and infinite where fewer than three windows show an order.
     """
     square, own = [], []
-    for one in windows:
-        value, seen = np.nan_to_num(one.value), np.isfinite(one.value)
-        weight = np.where(seen, 1 / noise.at(one.frequency_hz), 0.0)
+    for window in windows:
+        value, seen = np.nan_to_num(window.value), np.isfinite(window.value)
+        weight = np.where(seen, 1 / noise.at(window.frequency_hz), 0.0)
         count, total = seen.sum(axis=0), np.maximum(weight.sum(axis=0), np.finfo(float).tiny)
         share = weight / total
         mean = np.sum(share * value, axis=0)

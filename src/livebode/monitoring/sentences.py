@@ -131,14 +131,14 @@ def offset_unknown(machine: LearnedMachine, error: float, sample: int, time_s: f
     between, smallest = machine.between, machine.held.smallest
     assert between is not None
     along = np.flatnonzero(between.dominant(smallest))
-    what = [WHAT[DIRECTIONS[j]] for j in along]
+    parts = [WHAT[DIRECTIONS[j]] for j in along]
     size = np.abs(between.direction[along]) * 100
     beyond = ", ".join(f"{3 * between.spread * s:.2g} %" for s in size)
     message = Message(
         "The learned runs differ from each other in {parts}, and the windows of this run determine its own offset only "
         "to ± {reachable_percent:.2g} %. Until it is known better, such a change is detected only beyond {beyond} from "
         "the baseline. Use a stronger excitation, or learn with the cause as a covariate.",
-        parts=Message.conjunction(what),
+        parts=Message.conjunction(parts),
         reachable_percent=float(error * size[0]),
         beyond=beyond,
     )

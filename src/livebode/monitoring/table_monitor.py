@@ -211,8 +211,8 @@ class TableMonitor(StatefulBase):
 
     def finish(self) -> list[Event]:
         """An alarm that is not reported yet, and the last time that was not monitored."""
-        found = self._changes() if self._found >= 0 and len(self._moment.array) else []
-        return found + self.time.finish()
+        events = self._changes() if self._found >= 0 and len(self._moment.array) else []
+        return events + self.time.finish()
 
     def _row(self, score: Floats, information: Floats, moment: tuple[float, int, float, float]) -> list[Event]:
         self._rows_judged += 1

@@ -24,8 +24,8 @@ def differs(
     """A change; `moment` is schedule, sample and time of every row since it began."""
     if table.what == "lines":
         amount, bound = _polar(amount, bound)
-    at = sorted(np.flatnonzero(changed), key=lambda j: -abs(amount[j]) / bound[j])
-    items = [_item(table, int(j), float(amount[j]), float(bound[j])) for j in at]
+    components = sorted(np.flatnonzero(changed), key=lambda j: -abs(amount[j]) / bound[j])
+    items = [_item(table, int(j), float(amount[j]), float(bound[j])) for j in components]
     changes = with_more([_phrase(item) for item in items[:_NAMED]], len(items) - _NAMED)
     schedule = moment[:, 0][np.isfinite(moment[:, 0])]
     where = [float(schedule.min()), float(schedule.max())] if schedule.size else None

@@ -120,11 +120,11 @@ class TorqueModel:
             angle = np.cumsum(angle) / rate_hz
         signals = np.stack([learned * np.sign(velocity) - acting, smooth, learned, velocity])
         strokes = [
-            one
-            for one in strokes_of(angle * 2 * np.pi / self.turn, velocity, signals, rate_hz, float(self.speed[0]))
-            if one.angle.size >= _STROKE_S * rate_hz
+            stroke
+            for stroke in strokes_of(angle * 2 * np.pi / self.turn, velocity, signals, rate_hz, float(self.speed[0]))
+            if stroke.angle.size >= _STROKE_S * rate_hz
         ]
-        alone = [self._without_lines(one) for one in strokes] if self.shafts else []
+        alone = [self._without_lines(stroke) for stroke in strokes] if self.shafts else []
         return _friction(strokes), [self._orders(alone, shaft, sharp) for shaft in self.shafts]
 
     def _without_lines(self, stroke: Stroke) -> Stroke:
@@ -153,6 +153,6 @@ class TorqueModel:
 
 
 def _friction(strokes: list[Stroke]) -> StrokeFriction:
-    _, acting, learned, speed = np.array([one.torque.mean(axis=1) for one in strokes]).reshape(-1, 4).T
-    samples = np.array([float(one.angle.size) for one in strokes])
+    _, acting, learned, speed = np.array([stroke.torque.mean(axis=1) for stroke in strokes]).reshape(-1, 4).T
+    samples = np.array([float(stroke.angle.size) for stroke in strokes])
     return StrokeFriction(speed, acting * np.sign(speed) / learned, samples)

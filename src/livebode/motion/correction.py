@@ -148,11 +148,11 @@ class MotionCorrection(StatefulBase):
 
     @property
     def counts(self) -> dict[str, int]:
-        """As of a Tracker: numbers of received, missing, and excluded samples for each reason."""
+        """Numbers of received, missing, and excluded samples for each reason."""
         return self._tracker.counts
 
     def found(self) -> dict[str, Any]:
-        """As `Tracker.found`, and the model of the newest chunk: its masses, and its belt at eleven positions."""
+        """Basis of the responses, and the model of the newest chunk: its masses, and its belt at eleven positions."""
         driven_by = "torque" if self._drive is None else "excitation"
         model = None if self.model is None else self.model.plain()
         ripple = [asdict(order) for order in self._ripple.orders]
@@ -186,12 +186,12 @@ class MotionCorrection(StatefulBase):
             done.append(self._finished())
         if not self._recorded:
             self._from = block.start
-        at, rows = 0, 0
-        while at < len(block):
+        begin, rows = 0, 0
+        while begin < len(block):
             required = self._from + self._chunk + self.settings.lines.window
-            piece = block.cut(at, required - block.start)
+            piece = block.cut(begin, required - block.start)
             self._recorded.append(piece)
-            at += len(piece)
+            begin += len(piece)
             until = int(np.searchsorted(tracked.sample, piece.stop))
             self._waiting.append(tracked[rows:until])
             rows = until
@@ -250,9 +250,9 @@ class MotionCorrection(StatefulBase):
             nothing = np.full_like(tracked.value, complex(np.nan, np.nan))
             return replace(tracked, value=nothing, sigma=np.full(nothing.shape, np.nan), valid=tracked.valid & False)
         held = self._standstill.tail(chunk)
-        if self._learner.has_travelled and (found := self._standstill.stretches(now.left, chunk)):
+        if self._learner.has_travelled and (stretches := self._standstill.stretches(now.left, chunk)):
             wide = replay(self._learner.widened(tracked, chunk, now))
-            held += self._standstill.held(found, tracked, wide.seen, chunk, wide.model.rigid_kg_m2)
+            held += self._standstill.held(stretches, tracked, wide.seen, chunk, wide.model.rigid_kg_m2)
             if not held and self._learner.travels:
                 now = self._learner.completed(tracked, chunk, replay, now)
         left = without(now.left.velocity, held, chunk, self.settings.lines.window)

@@ -68,9 +68,9 @@ class Scatter(StatefulBase):
         s = self._settings
         rows = {s.output: velocity, s.input: chunk.u} | ({s.excitation: chunk.w} if s.excitation else {})
         names = [name for name in rows if name]
-        at = max(chunk.first - s.lines.window + 1 - chunk.start, 0)
-        data = np.array([rows[name][at:] for name in names])
-        return Block(data, tuple(map(Channel, names)), s.lines.rate_hz, start=chunk.start + at, gap=True)
+        begin = max(chunk.first - s.lines.window + 1 - chunk.start, 0)
+        data = np.array([rows[name][begin:] for name in names])
+        return Block(data, tuple(map(Channel, names)), s.lines.rate_hz, start=chunk.start + begin, gap=True)
 
     def _state(self) -> dict[str, Any]:
         return {"memory": self._memory}

@@ -52,14 +52,14 @@ def quantiles(values: Floats) -> Floats:
     ordered = np.sort(np.ascontiguousarray(values.T), axis=1)
     count = np.count_nonzero(np.isfinite(ordered), axis=1)
     every = np.arange(len(ordered))
-    found = []
+    rows = []
     for q in (SPAN[0], 0.5, SPAN[1]):
         position = q * np.maximum(count - 1, 0)
         below = position.astype(np.intp)
         above = np.minimum(below + 1, np.maximum(count - 1, 0))
         low, high = ordered[every, below], ordered[every, above]
-        found.append(low + (high - low) * (position - below))
-    return np.array(found)
+        rows.append(low + (high - low) * (position - below))
+    return np.array(rows)
 
 
 def unwrapped(phase_deg: Floats, weak: NDArray[np.bool_]) -> Floats:
@@ -72,15 +72,15 @@ def unwrapped(phase_deg: Floats, weak: NDArray[np.bool_]) -> Floats:
     lead = known & ~weak if np.any(known & ~weak) else known
     if not np.any(lead):
         return phase_deg.copy()
-    at = np.arange(len(phase_deg))
+    index = np.arange(len(phase_deg))
     led = np.unwrap(phase_deg[lead], period=360.0)
     middle = (led.min() + led.max()) / 2
     led -= 360.0 * np.floor((middle - _TURN_FROM_DEG) / 360.0)
-    return near(phase_deg, np.interp(at, at[lead], led))
+    return near(phase_deg, np.interp(index, index[lead], led))
 
 
 def near(phase_deg: Floats, reference_deg: Floats) -> Floats:
-    """The same angles on the branch within half a turn of the reference."""
+    """Angles on the branch within half a turn of the reference."""
     return np.asarray(phase_deg - 360.0 * np.rint((phase_deg - reference_deg) / 360.0))
 
 

@@ -133,9 +133,9 @@ def _panels(figure: Figure, down: int, across: int) -> NDArray[np.object_]:
     return panels
 
 
-def _entry(pair: Sequence[Axes], look: Style, responses: MatrixResponses, at: tuple[int, int]) -> None:
+def _entry(pair: Sequence[Axes], look: Style, responses: MatrixResponses, place: tuple[int, int]) -> None:
     """Title of one Bode plot, its invalid lines, and the reason if all are."""
-    o, i = at
+    o, i = place
     magnitude, phase = pair
     units = responses.units[o] if responses.units else ()
     unit = f", re 1 {units[i]}" if len(set(units)) > 1 and units[i] else ""  # a symbol in every language

@@ -97,7 +97,7 @@ def draw_nichols(axes: Axes, curve: Curve, cloud: Cloud | None = None, *, critic
 def _draw(
     axes: Axes,
     curve: Curve,
-    at: tuple[Floats, Floats],
+    xy: tuple[Floats, Floats],
     regions: list[Floats],
     behind: tuple[Floats, Floats] | None,
     same_scale: bool = False,
@@ -105,7 +105,7 @@ def _draw(
     """The curve, its regions, the dots of the cloud behind it, and the frequencies of its ends."""
     from matplotlib.collections import PolyCollection
 
-    line = axes.plot(*at, marker="o", markersize=3.5, linewidth=1.0, color=curve.color, label=curve.label, zorder=5)[0]
+    line = axes.plot(*xy, marker="o", markersize=3.5, linewidth=1.0, color=curve.color, label=curve.label, zorder=5)[0]
     look: dict[str, Any] = {"facecolor": line.get_color(), "linewidth": 0}
     if behind is not None:
         step = -(-len(behind[0]) // _CLOUD_MAX)
@@ -121,10 +121,10 @@ def _draw(
             )
             axes.update_datalim(np.concatenate(known))
     axes.grid(True, linewidth=0.6, alpha=0.5)
-    drawn = np.flatnonzero(np.isfinite(at[0]) & np.isfinite(at[1]))
+    drawn = np.flatnonzero(np.isfinite(xy[0]) & np.isfinite(xy[1]))
     for i in drawn[[0, -1]] if drawn.size else ():
         axes.annotate(
-            f"{frequency_label(curve.frequency_hz[i])} Hz", (at[0][i], at[1][i]), (5, 4), textcoords="offset points",
+            f"{frequency_label(curve.frequency_hz[i])} Hz", (xy[0][i], xy[1][i]), (5, 4), textcoords="offset points",
             fontsize="small", color=line.get_color(), zorder=6,
         )  # fmt: skip
 
@@ -168,13 +168,13 @@ def _nichols_regions(value: Complex, radius: Floats, phase_deg: Floats) -> list[
     """
     turn = np.exp(2j * np.pi * np.arange(_CORNERS) / _CORNERS)
     regions = []
-    for one, reach, deg in zip(value, radius, phase_deg):
-        if reach < abs(one):
-            around = 1 + reach / abs(one) * turn
-            regions.append(np.column_stack([deg + np.degrees(np.angle(around)), decibels(one * around)]))
+    for centre, reach, deg in zip(value, radius, phase_deg):
+        if reach < abs(centre):
+            around = 1 + reach / abs(centre) * turn
+            regions.append(np.column_stack([deg + np.degrees(np.angle(around)), decibels(centre * around)]))
             continue
         away = np.linspace(-np.pi, np.pi, _CORNERS)
-        far = abs(one) * np.cos(away) + np.sqrt(reach**2 - (abs(one) * np.sin(away)) ** 2)
+        far = abs(centre) * np.cos(away) + np.sqrt(reach**2 - (abs(centre) * np.sin(away)) ** 2)
         top = np.column_stack([deg + np.degrees(away), np.maximum(decibels(far), FLOOR_DB)])
         regions.append(np.concatenate([top, [[deg + 180, FLOOR_DB], [deg - 180, FLOOR_DB]]]))
     return regions

@@ -26,11 +26,11 @@ def plot_responses(
             allowed=list(get_args(PlotKind)),
         )
     panels = _panels(kind, axes)
-    one = front or responses.newest()
-    if one is not None:
-        _draw(kind, panels, responses, one, _curve(one, c, label, color))
+    response = front or responses.newest()
+    if response is not None:
+        _draw(kind, panels, responses, response, _curve(response, c, label, color))
     _labels(kind, panels, responses)
-    if axes is None and one is not None:
+    if axes is None and response is not None:
         panels[0].legend(frameon=False, fontsize="small")
     return panels if kind == "bode" else panels[0]
 
@@ -43,12 +43,12 @@ def _panels(kind: PlotKind, axes: Any) -> Any:
             from matplotlib import pyplot
 
         ratios = {"height_ratios": [3, 2]} if count == 2 else {}
-        _, found = pyplot.subplots(
+        _, panels = pyplot.subplots(
             count, 1, sharex=True, squeeze=False, gridspec_kw=ratios, layout="constrained", figsize=(7.0, 5.2)
         )
-        return found[:, 0]
+        return panels[:, 0]
     given = np.atleast_1d(np.asarray(axes, dtype=object)).ravel()
-    if len(given) != count or not all(hasattr(one, "plot") for one in given):
+    if len(given) != count or not all(hasattr(panel, "plot") for panel in given):
         raise UsageError(
             "wrong-shape",
             f"a {kind} plot needs {'two axes, of magnitude and phase' if count == 2 else 'one axes'}, "
@@ -60,16 +60,16 @@ def _panels(kind: PlotKind, axes: Any) -> Any:
     return given
 
 
-def _curve(one: Response, c: float | None, label: str | None, color: Any) -> Curve:
-    use = one.valid & np.isfinite(one.value) & (one.value != 0)
+def _curve(response: Response, c: float | None, label: str | None, color: Any) -> Curve:
+    use = response.valid & np.isfinite(response.value) & (response.value != 0)
     # Also without a drawn bound: the phase of a line that may be zero follows the other lines.
-    radius = one.bound(2.0 if c is None else c)
+    radius = response.bound(2.0 if c is None else c)
     words = "" if c is None else f"bound: {100 * -np.expm1(-(c**2)):.1f} % ({c:g}σ)"
-    value = np.where(use, one.value, np.nan)
-    return Curve(one.frequency_hz, value, np.where(use, radius, np.nan), label or one.quantity, words, color)
+    value = np.where(use, response.value, np.nan)
+    return Curve(response.frequency_hz, value, np.where(use, radius, np.nan), label or response.quantity, words, color)
 
 
-def _draw(kind: PlotKind, panels: Any, responses: Responses, one: Response, curve: Curve) -> None:
+def _draw(kind: PlotKind, panels: Any, responses: Responses, response: Response, curve: Curve) -> None:
     use = responses.valid & np.isfinite(responses.value) & (responses.value != 0)
     rows = use.any(axis=1)
     cloud = Cloud(np.where(use, responses.value, np.nan)[rows]) if np.count_nonzero(rows) > 1 else None
@@ -77,7 +77,7 @@ def _draw(kind: PlotKind, panels: Any, responses: Responses, one: Response, curv
         draw_bode(panels[0], panels[1], curve, cloud)
         return
     draw = draw_nyquist if kind == "nyquist" else draw_nichols
-    draw(panels[0], curve, cloud, critical=one.quantity == "open loop")
+    draw(panels[0], curve, cloud, critical=response.quantity == "open loop")
 
 
 def _labels(kind: PlotKind, panels: Any, responses: Responses) -> None:
@@ -116,10 +116,10 @@ def _new_matrix(rows: int, columns: int) -> Any:
 
     ratios = {"height_ratios": [3, 2] * (rows // 2)}
     size = (2.0 + 3.4 * columns, 1.0 + 1.5 * rows)
-    _, found = pyplot.subplots(
+    _, panels = pyplot.subplots(
         rows, columns, sharex=True, sharey="row", squeeze=False, gridspec_kw=ratios, layout="constrained", figsize=size
     )
-    return found
+    return panels
 
 
 def _outer_labels(panels: Any) -> None:

@@ -1,4 +1,4 @@
-// Types of what the server sends (state.py, notices.py, trends.py, client.py) and of what the panels share.
+// Types of what the server sends (state.py, notices.py, recent.py, browser_socket.py) and of what the panels share.
 import type { Rows } from "./rows.js";
 
 export type Quantity = "plant" | "open loop" | "closed loop" | "sensitivity";
@@ -80,7 +80,7 @@ export interface MatrixNames {
   first_axis: number;
 }
 
-/** One matrix; see matrix_answer.py. */
+/** One matrix; see matrix_group.py. */
 export interface MatrixAnswer extends MatrixNames {
   frequency_hz: number[];
   time_s: number;
@@ -200,7 +200,7 @@ export interface Alarm {
   shelf: { by: string; until_s: number; reason: string } | null;
 }
 
-/** A change of an alarm; see alarm_history.py. */
+/** A change of an alarm; see alarm.py. */
 export interface Transition {
   number: number;
   time_s: number;

@@ -109,7 +109,7 @@ def fit_gantry(
 
     Examples
     --------
-    >>> from livebode.mimo import MatrixExcitation
+    >>> from livebode.excitation import MatrixExcitation
     >>> from livebode_matrix import example_matrix_responses
     >>> found = fit_gantry(example_matrix_responses(), Gantry())
     >>> abs(found["left belt's stiffness"] - 4e5) < 2 * found.bound("left belt's stiffness")

@@ -7,18 +7,20 @@ from dataclasses import replace
 
 import numpy as np
 
-from livebode.fitting import Kind, Outputs, Separated, pole_price, possible, reduced_structures, solve
+from livebode.fitting import Kind, Outputs, SeparatedFit, pole_price, possible, reduced_structures, solve
 from livebode_matrix.least_squares import MatrixMinimum
 from livebode_matrix.refinement import refined
 from livebode_matrix.whitening import Weighted
 
-Fitted = tuple[Separated, MatrixMinimum]
+Fitted = tuple[SeparatedFit, MatrixMinimum]
 
 _ROUNDS = 2
 _HOPELESS = 200.0  # by how much more a structure costs with independent entries that is not fitted again
 
 
-def chosen(weighted: Weighted, outs: Outputs, begun: Sequence[Separated], kind: Kind, *, fixed: bool) -> list[Fitted]:
+def chosen(
+    weighted: Weighted, outs: Outputs, begun: Sequence[SeparatedFit], kind: Kind, *, fixed: bool
+) -> list[Fitted]:
     """Fits by increasing cost, the first without the terms that do not lower it.
 
     A search with independent entries takes noise that they share for a pole: outputs whose noise is alike, and the
@@ -33,7 +35,7 @@ def chosen(weighted: Weighted, outs: Outputs, begun: Sequence[Separated], kind: 
         Whether the number of poles remains.
     """
 
-    def fitted(one: Separated) -> Fitted:
+    def fitted(one: SeparatedFit) -> Fitted:
         found, minimum = refined(weighted, outs, one)
         return replace(found, cost=_cost(weighted, found, minimum)), minimum
 
@@ -59,8 +61,8 @@ def _by_cost(one: Fitted) -> tuple[bool, float]:
     return not one[0].settled, one[0].cost
 
 
-def _cost(weighted: Weighted, of: Separated, minimum: MatrixMinimum) -> float:
-    """−2·ln(likelihood) and the price of the parameters, as that of `Separated`.
+def _cost(weighted: Weighted, of: SeparatedFit, minimum: MatrixMinimum) -> float:
+    """−2·ln(likelihood) and the price of the parameters, as that of `SeparatedFit`.
 
     Noise whose covariance is estimated makes the errors of a line a complex matrix of Student's distribution: (d + m)·
     ln det(I + N⁻¹·E·S⁻¹·E*/d) + m·ln det N, for m inputs (Gupta and Nagar, Matrix Variate Distributions, 2000, ch. 4).

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Floats
 from livebode.core import FitError, MatrixResponses, Parameters, Responses
-from livebode.fitting import CommonPoles, Hold, Kind, Separated, assembled, check_model, outputs_of, search
+from livebode.fitting import CommonPoles, Hold, Kind, SeparatedFit, assembled, check_model, outputs_of, search
 from livebode_matrix.mode_choice import chosen
 from livebode_matrix.refinement import refined
 from livebode_matrix.whitening import Weighted
@@ -146,15 +146,15 @@ def _entry(matrix: MatrixResponses, output: int, input: int, whole: NDArray[np.b
     return replace(found, valid=found.valid & whole)
 
 
-def _started(like: MatrixModes, names: tuple[str, ...]) -> Separated:
-    if like.found is None or like.status != "ok" or like.outputs != names:
+def _started(like: MatrixModes, names: tuple[str, ...]) -> SeparatedFit:
+    if like.best is None or like.status != "ok" or like.outputs != names:
         raise FitError(
             "not-fitted",
             "the earlier fit is not valid, or is of other entries",
             "leave `like` out, so that the poles are searched for",
             status=like.status,
         )
-    return like.found
+    return like.best
 
 
 def _residues(names: tuple[str, ...], values: Floats, entries: tuple[str, ...]) -> Complex:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from livebode.core import Event, FitError, MatrixResponses, Stage, StatefulBase, UsageError
-from livebode.mimo import mean_matrix
+from livebode.fitting import mean_matrix
 from livebode.simulation import Gantry
 from livebode_matrix.alarm import MatrixAlarm, cleared
 from livebode_matrix.change import MatrixPair, tail

@@ -8,7 +8,7 @@ import numpy as np
 
 from livebode.arrays import Complex, Floats
 from livebode.core import FitError, MatrixResponses
-from livebode.mimo import mean_matrix
+from livebode.fitting import mean_matrix
 from livebode_matrix.row_scatter import row_scatter
 
 _ROUNDING = 1e-12

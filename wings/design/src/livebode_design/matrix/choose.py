@@ -8,7 +8,6 @@ from math import sqrt
 import numpy as np
 
 from livebode.core import DesignError, Lines, UsageError
-from livebode.mimo import predict
 from livebode_design.matrix.candidate import REPETITIONS_MAX, REPETITIONS_MIN, Candidate, candidate, repetitions
 from livebode_design.matrix.explain import explained
 from livebode_design.matrix.machine import MatrixLimits, MatrixMachine
@@ -55,7 +54,7 @@ def choose_matrix(spec: MatrixSpec, machine: MatrixMachine, limits: MatrixLimits
     gentle = min(1.0, float(best.ratio.max()) / sqrt(times)) if spec.requires else 1.0
     excitation = best.excitation.scaled(gentle)
     f = lines.frequency_hz
-    unit = predict(excitation, machine.response, 1.0, machine.described).sigma
+    unit = excitation.predict(machine.response, 1.0, machine.described).sigma
     design = MatrixDesign(
         machine=machine,
         limits=limits,
