@@ -16,9 +16,9 @@ from livebode.analysis import Overview
 from livebode.core import Event
 from livebode.dashboard import AlarmShelf, Dashboard, Hub, ServerSettings
 from livebode.dashboard.alarm_requests import shelving, unshelving
+from livebode.dashboard.board import AxisVerdict, verdict
 from livebode.dashboard.notices import event_id
 from livebode.dashboard.state import State
-from livebode.dashboard.verdict import AxisVerdict, verdict
 from livebode.runtime import RunControl, RunEnded, RunStarted
 from tests.support.browser import until
 from tests.support.dashboards import LINES, Watched, begin

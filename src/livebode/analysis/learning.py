@@ -75,7 +75,7 @@ class HealthyRun(Protocol):
 
     @property
     def is_matrix(self) -> bool:
-        """Whether it has matrices of responses."""
+        """Whether the run has matrices of responses."""
 
     @property
     def place(self) -> str:

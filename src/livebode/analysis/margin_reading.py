@@ -17,8 +17,8 @@ from livebode.kernel import MarginGrid, fit_margins
 
 _DB = 20 / np.log(10)
 _ROWS = 64  # evaluated at once: some 2 MB a grid
-_STEP = 1e-5
-_PEAK_STEP = 1e-3
+_STEP = 1e-5  # of a frequency: central differences of ln L have an error of 1e-10
+_PEAK_STEP = 1e-3  # differences of slopes, which are themselves differences, need a larger step
 _OF_SIGMA, _OF_VALUE = 1e-3, 1e-7  # step of a parameter
 
 

@@ -17,10 +17,10 @@ from livebode.kernel import FeedbackSeries, FitModel, MarginGrid
 _LOWEST = 1e-7  # of the rate: far below every corner of a drive's controllers
 _PER_DECADE_OUTSIDE, _PER_DECADE = 30, 150
 _POINTS_IN_A_PEAK = 3.0  # in half the width of a resonance
-_POINTS_MAX = 4000
+_POINTS_MAX = 4000  # a resonance far beyond the band may ask for more
 _FREQUENCY_STEP, _DAMPING_STEP = 1.25, 2.0  # factors, to which resonances are rounded
 _STEPS_MAX, _NO_PEAK = 1000, 1 << 20
-_KNOWN_MAX = 32
+_KNOWN_MAX = 32  # grids in memory; a run needs few, because resonances are rounded
 
 # Of the series of the controllers.
 _DEGREE = 15

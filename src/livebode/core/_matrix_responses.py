@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from livebode.arrays import Complex, Floats
-from livebode.core._matrix_conversion import dataset, frd
+from livebode.core._conversion import matrix_dataset, matrix_frd
 from livebode.core._response import Responses, widened
 from livebode.core.errors import GridError, UsageError
 from livebode.core.lines import Lines, ends, position, within
@@ -375,7 +375,7 @@ class MatrixResponses(RowArrays):
         >>> bool(np.allclose(covariance, responses.covariance))
         True
         """
-        return dataset(self, REASONS)
+        return matrix_dataset(self, REASONS)
 
     def to_frd(self, row: int = -1) -> Any:
         """python-control's FrequencyResponseData of one row, in rad/s, at lines where all columns are valid.
@@ -387,7 +387,7 @@ class MatrixResponses(RowArrays):
         ExtraError
             If python-control is not installed.
         """
-        return frd(self, row)
+        return matrix_frd(self, row)
 
     def __repr__(self) -> str:
         return (

@@ -17,7 +17,7 @@ from livebode.arrays import Floats
 normal_quantile = NormalDist().inv_cdf
 """Value that a standard normal variable remains below with a probability."""
 
-_SETTLED, _STEPS_MAX = 1e-13, 100
+_SETTLED, _STEPS_MAX = 1e-13, 100  # some units in the last place, and an end where rounding keeps a step larger
 
 
 def f_exceeded(value: float, numerator: int, denominator: float) -> float:

@@ -19,7 +19,7 @@ _LINES_MAX = 100_000
 _DIGITS_MAX, _SHOWN = 40, 120
 CLOCK_ERROR = 2e-4
 """Relative difference up to which two rates are one: that of two quartz clocks, or of a rate estimated from stamps."""
-_BINS_APART_MAX, _BINS_APART = 0.25, 1e-3
+_BINS_APART_MAX, _BINS_APART = 0.25, 1e-3  # of the spacing of bins; `same_frequencies` gives the reason
 WINDOW_MAX = 1 << 24
 """Longest window, samples: that of the kernel; 70 minutes at 4 kHz."""
 

@@ -18,7 +18,7 @@ from livebode.core.rows import RowArrays
 OK = "ok"
 """The status of a valid row; any other status is the reason why the row contains NaN."""
 
-_STEP = 1e-6
+_STEP = 1e-6  # of a value, to both sides: the cube root of the precision is about 6e-6
 
 
 def half_width(sigma: Floats, probability: float) -> Floats:

@@ -10,7 +10,7 @@ _LEVELS_MAX = 2.0**23  # between the smallest and the largest value
 _SINGLE, _DOUBLE = 2.0**-24, 2.0**-50  # relative errors of a value, with room for a few operations in double precision
 _WHOLE = 0.02  # of a step: largest distance of a value from the grid
 _CANCELLED = 1e-5  # of a step: its own error, from the difference of larger ones
-_DIVISIONS_MAX = 64
+_DIVISIONS_MAX = 64  # each at least halves the step, so that this number is never reached
 
 
 def step_of(samples: Floats) -> float:

@@ -23,7 +23,7 @@ COOKIE = "livebode"
 SESSION_S = 12 * 3600.0
 _SESSIONS_MAX = 64
 _ADDRESSES_MAX = 1024
-_FREE_TRIES = 5
+_FREE_TRIES = 5  # a person mistypes; from here on the pauses double
 _PAUSE_S_MAX = 300.0
 
 

@@ -85,7 +85,7 @@ class AlarmStatus:
         self.active, self.returned_s = False, time_s
 
     def acknowledge(self, event: Event) -> None:
-        """It is acknowledged by this event."""
+        """Acknowledge the alarm by this event."""
         self.by, self.comment = text_in(event, "by"), text_in(event, "comment")
         if self.active and self.kind.end == "acknowledged":
             self.end_at(event.time_s)
@@ -103,7 +103,7 @@ class AlarmStatus:
         return self._times[0] + CHATTER_S if full and self._times[-1] - self._times[0] <= CHATTER_S else None
 
     def chatters_at(self, time_s: float) -> bool:
-        """Whether it chatters at this time of the run."""
+        """Whether the alarm chatters at this time of the run."""
         until_s = self.chatters_until_s
         return until_s is not None and time_s <= until_s
 

@@ -78,7 +78,7 @@ class Dashboard:
         return hub
 
     def _of_matrix(self, name: str, entries: Sequence[tuple[str, str]]) -> MatrixHub:
-        """Its entries are in order, output by output."""
+        """Hub of a matrix run, whose entries are in order, output by output."""
         hub = MatrixHub(name, list(entries))
         outputs, inputs = (tuple(dict.fromkeys(entry[k] for entry in entries)) for k in (0, 1))
         group = MatrixGroup(name, outputs, inputs, len(self._states), hub.newest)

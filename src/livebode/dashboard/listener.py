@@ -110,7 +110,7 @@ HANDSHAKE_S = 10.0
 _DESCRIPTORS_PER_CONNECTION = 4  # the connection and a file that it receives; as many are reserved for the record
 _SWEEP_S = 1.0
 _SENTENCE_S = 60.0
-_REST_S = 0.2
+_REST_S = 0.2  # where accepting fails for want of descriptors, an immediate retry fails too
 _Accepted = tuple[socket.socket, Any]
 _ROUND = 8
 """Connections that are taken at once, so that all their requests are read: more than a browser opens."""
@@ -142,7 +142,7 @@ class _Connection:
     def __init__(self, taken: socket.socket, address: str, since_s: float) -> None:
         self.socket, self.address, self.since_s = taken, address, since_s
         self.asks = False
-        """Whether it has sent something."""
+        """Whether the client has sent something."""
         self.protocol: PatientProtocol | None = None  # known after the TLS handshake
         self.serving: asyncio.Task[None] | None = None
 
@@ -156,7 +156,7 @@ class _Connection:
 
     @property
     def unread(self) -> bool:
-        """Whether it has sent something, and nothing of it was read."""
+        """Whether the client has sent something, and nothing of it was read."""
         return self.asks and (self.protocol is None or not self.protocol.heard)
 
     @property

@@ -15,7 +15,7 @@ from livebode.language import Message
 from livebode.records import RunRecord, thinned
 
 ROWS_MAX = 2000
-_READ_BYTES = 8 << 20
+_READ_BYTES = 8 << 20  # longer spans are shown from the thinned copy in memory
 _WHOLE = 0.95  # of the run: for longer spans the thinned copy in memory is equivalent
 
 

@@ -19,7 +19,7 @@ _VALUES_MAX = 1 << 21
 RECORDED_VALUES_MAX = 1 << 13
 """Responses × lines of a run in segments, about 0.5 MB: older ones are in the record, and there may be many axes."""
 _PARTS_MAX = 16
-_SLACK = 1.25
+_SLACK = 1.25  # joining copies everything: it is done after a quarter of new rows, not after each
 
 
 class RecentResponses:

@@ -31,7 +31,7 @@ from livebode.language import Message, negotiated
 from livebode.records import Notes, delete, to_json, write_notes
 
 NAME_LETTERS_MAX = 255
-VERSION_MAX = 1 << 53
+VERSION_MAX = 1 << 53  # the largest whole number that JavaScript represents exactly
 
 
 def version(query: Mapping[str, str]) -> int:

@@ -33,7 +33,7 @@ from livebode.runtime import RunControl
 
 _SYMBOLS = {"plant": "G", "open loop": "L", "closed loop": "T", "sensitivity": "S"}
 _PACE_S = 3.0
-_SILENT_S = 2.0
+_SILENT_S = 2.0  # or three usual intervals, for sources that send rarely
 _BACKLOG_S = 2.0
 _GROWS_S = 10.0
 _SENT = 90  # responses that were sent in three seconds: one that a person freezes is among them

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Floats
 from livebode.core import GridError, Lines, Stage, StatefulBase, UsageError
-from livebode.estimation.implausible import PlausibleRange
-from livebode.estimation.spikes import SpikeGate
+from livebode.estimation.implausible import PlausibleRange, SpikeGate
 from livebode.kernel import INSTRUCTION_SET_VARIABLE, SlidingDFT, instruction_set, instruction_sets
 
 _NONE = np.zeros(0, dtype=np.intp)
@@ -194,7 +193,7 @@ class LineSpectra(StatefulBase):
 
 
 def _joined(first: NDArray[np.intp], second: NDArray[np.intp]) -> NDArray[np.intp]:
-    """One after the other; nearly always there are none."""
+    """Positions joined in order; the second are nearly always none."""
     return np.concatenate([first, second]) if second.size else first
 
 

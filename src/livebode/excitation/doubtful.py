@@ -14,7 +14,7 @@ from livebode.excitation.significance import BinClasses
 
 # Of the strongest line, 26 dB: distortion of a good drive is below, and designed lines are above.
 _DESIGNED = 0.05
-_NEAR_BINS, _MAINS_DRIFT = 0.1, 2e-3
+_NEAR_BINS, _MAINS_DRIFT = 0.1, 2e-3  # of a bin, and of the frequency, which wanders by 0.1 Hz around 50 Hz
 _HUM_HZ_MAX = 400.0  # hum of this level is at the first harmonics of the mains
 _HARMONICS_MAX = 20  # of a single line; higher ones of this level do not exist
 

@@ -1,4 +1,4 @@
-"""One line after the other."""
+"""Stepped sines: one line after the other."""
 
 from __future__ import annotations
 

@@ -259,7 +259,7 @@ def _reduced(
     used: NDArray[np.bool_],
     count: NDArray[np.int64] | None = None,
 ) -> Responses:
-    """These values with the extent and the means of the other columns."""
+    """Responses with these values, and with the extent and the means of the other columns."""
     each = np.ones_like(used, dtype=np.int64) if count is None else count
 
     def mean(values: Floats) -> Floats:

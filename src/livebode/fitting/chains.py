@@ -11,10 +11,10 @@ import numpy as np
 from livebode.arrays import Complex, Floats
 from livebode.core import UsageError
 from livebode.fitting.modal import QUALITY, chain_of, scan
-from livebode.fitting.physical import EvaluationGrid, Parameter, PhysicalModel, delay, free_friction
-from livebode.fitting.polynomials import plus, times
+from livebode.fitting.physical import EvaluationGrid, Parameter, PhysicalModel, delay, free_friction, plus, times
 from livebode.language import Message
 
+# Bounds far beyond every machine: they only keep the search finite.
 _INERTIA = (1e-9, 1e7)
 _MASS = (1e-6, 1e9)
 _STIFFNESS = (1e-6, 1e15)

@@ -13,8 +13,8 @@ from livebode.core import Lines, Responses, Stage, StatefulBase, sum_exceeded
 
 FALSE_ALARM = 0.01
 """Probability that a record of a machine that does not drift is reported, all lines together."""
-_GROUPS_MAX = 32
-_GROUPS_MIN = 6
+_GROUPS_MAX = 32  # when all are full, neighbours are added: memory does not grow with the record
+_GROUPS_MIN = 6  # with fewer, a trend and its scatter have too few degrees of freedom
 _ROUNDING = 1e-9  # of a response
 _MOVED = 1e-3  # of the largest value of the schedule
 # A trend is at most so far from its middle for the share 1 - 1/e of the record, as noise from its mean within sigma.

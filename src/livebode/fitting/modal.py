@@ -13,8 +13,8 @@ from livebode.fitting.transfer import Transfer
 QUALITY = 10.0
 """Quality factor of the scanned resonances; Table I of Nevaranta 2016 has it."""
 
-_SCANNED = {0: 1, 1: 48, 2: 20}
-_TRIED = {0: 1, 1: 4, 2: 16}
+_SCANNED = {0: 1, 1: 48, 2: 20}  # frequencies by number of modes; for two modes all pairs are tried, 190 of 20
+_TRIED = {0: 1, 1: 4, 2: 16}  # by number of modes: with more of them there are more local minima
 _LEAST = 1e-3  # of the largest weight, for one that is negative
 
 

@@ -10,18 +10,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from livebode.core import FitError, Parameters, Response, Responses, not_installed
-from livebode.fitting.competitors import AllowedChanges, Competitor, compete, competitor, mixed, positive
-from livebode.fitting.extended_model import WORDS
+from livebode.fitting.competitors import WORDS, AllowedChanges, Competitor, compete, competitor, mixed, positive
 from livebode.fitting.fitter import Fitter
-from livebode.fitting.hold import to_discrete
 from livebode.fitting.mean import mean_response
 from livebode.fitting.patterns import correlation, covariance, follows_pattern
 from livebode.fitting.physical import DELAY, EvaluationGrid, Hold, PhysicalModel
 from livebode.fitting.problem import MeasuredRows
 from livebode.fitting.rows import NO_FIT, SENTENCES, fit_rows
+from livebode.fitting.transfer import to_discrete
 from livebode.language import Message
 
-_ROUNDING = 1e-9
+_ROUNDING = 1e-9  # of a value: rounding gives a quantity of fixed values a bound of this size
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,11 +16,10 @@ LACKS = 10.0
 RUNS = 2.6
 """Sigma of the correlation of neighbours from which residuals follow a pattern: once in 200 fits by chance."""
 
-_ROUNDING = 1e-8
 _FEW = 16  # lines, too few for the pattern to show
 _LENGTHS = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0)  # lines
 _SIZES = (0.5, 1.0, 2.0, 4.0, 8.0)  # of ε
-_ROUNDING = 1e-9
+_ROUNDING = 1e-9  # of |G|: a residual below is rounding, whose neighbours correlate too; and of a matrix
 
 
 def correlation(measured: MeasuredRows, fitted: FittedRows) -> float:

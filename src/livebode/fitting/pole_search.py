@@ -15,7 +15,7 @@ from livebode.fitting.separable import Outputs, SeparatedFit, left_over, solve, 
 Kind = Literal["modal", "rational"]
 
 ORDER_MAX = {"modal": 20, "rational": 40}
-_INTEGRATORS = 2
+_INTEGRATORS = 2  # at most: from torque to position
 _DIRECT = {"modal": 2, "rational": 1}
 _IN_VAIN = {"modal": 2, "rational": 4}  # orders in a row without a lower cost end the search
 _TRIED = 3  # starts for each added pole
@@ -25,7 +25,7 @@ _BEYOND = 1.5  # times the highest line, or the lowest line over it: a mode outs
 _NARROW = 0.1  # of the spacing of lines, for the half-width of a mode
 _FAR = 30.0  # times the highest line, or the lowest line over it: a pole outside is an integrator or a direct term
 _EVALUATIONS_FIRST = 12  # of a start, before the best one is continued
-_ROUNDS_SEARCH, _ROUNDS_LAST = 2, 8
+_ROUNDS_SEARCH, _ROUNDS_LAST = 2, 8  # of reweighting: a search only compares costs, the result needs ε to converge
 _ROUGH = 0.1  # model error with which a delay cannot be told from missing poles
 _EARLIEST_TICKS, _LATEST_TICKS, _LATEST_S = 2.0, 5.0, 0.02
 

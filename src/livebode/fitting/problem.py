@@ -51,9 +51,9 @@ def described(model: PhysicalModel, held: dict[str, float]) -> FitModel | None:
     return FitModel(kind, 1 + position, False, 1.0, 1.0, 0.0, table)
 
 
-_STEP = 1e-7
+_STEP = 1e-7  # of a coordinate: near the root of the precision, where truncation and rounding are alike
 _ENOUGH = 1e-4  # of chi²: a step of 1 % of sigma, after which the remaining error is far smaller
-_AT_BOUND = 1e-6
+_AT_BOUND = 1e-6  # of a coordinate: a fit that ends this close was stopped by the bound
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,17 +11,16 @@ from numpy.typing import ArrayLike, NDArray
 from livebode.arrays import Complex, Floats
 from livebode.core import OK, FitError, Parameters, Response, Responses, UsageError, not_installed
 from livebode.fitting.fitter import measured_of
-from livebode.fitting.hold import to_continuous
 from livebode.fitting.problem import MeasuredRows
 from livebode.fitting.rows import NO_RESPONSE, NOT_SEEN
-from livebode.fitting.transfer import Transfer
+from livebode.fitting.transfer import Transfer, to_continuous
 from livebode.fitting.weights import chi_squared, own_epsilon, squares, weights
 
 Method = Literal["levy", "sanathanan-koerner", "maximum likelihood"]
 
 _ROUNDS = 20
 _SETTLED = 1e-9
-_ORDER_MAX = 20
+_ORDER_MAX = 20  # higher powers of z are too nearly dependent in double precision
 
 
 class _Equations(NamedTuple):

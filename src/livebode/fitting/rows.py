@@ -14,7 +14,7 @@ from livebode.fitting.weights import chi_squared, lacks_more_than, own_epsilon, 
 from livebode.kernel import FitModel, FitRows, fit
 from livebode.language import Message
 
-_FROM = 0.03
+_FROM = 0.03  # of |G|: a smaller misfit remains the model's ε
 _EXPLAINED = 0.5
 _ROUNDS = 15
 
@@ -81,12 +81,12 @@ _WORD = "<U20"
 _FIRST_EPSILON = (
     0.1  # so that a line measured much more accurately than the model is valid does not dominate a first fit
 )
-_REWEIGHTED, _SAME = 8, 0.01
+_REWEIGHTED, _SAME = 8, 0.01  # rounds, and the change of ε by which no weight changes visibly
 _SUSPICIOUS = 4.0  # of a reduced chi², ε and all
 _WARM_ROUNDS = 12
-_DOF_LEAST = 3.0
+_DOF_LEAST = 3.0  # the correction d/(d − 2) of weights from estimated noise is infinite at two
 _CONDITION_MAX = 1e11
-_ROUNDING = 1e-14
+_ROUNDING = 1e-14  # keeps a singular matrix invertible; its inverse then exceeds the limit above
 
 
 class FittedRows(NamedTuple):

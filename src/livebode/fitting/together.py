@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from livebode.core import Emit, Parameters, Responses, ignore
-from livebode.fitting.fitter import Fitter
+from livebode.fitting.fitter import FitTask, Fitter, fitted_together
 from livebode.fitting.rows import FittedRows
-from livebode.fitting.tasks import FitTask, fitted_together
 
 
 def fit_each(

@@ -10,11 +10,10 @@ from livebode.core import BaselineError, Lines, counted
 from livebode.estimation import Settings
 from livebode.monitoring import baseline_file
 from livebode.monitoring.baseline_file import ROLES
-from livebode.monitoring.baseline_version import BaselineVersion, retained_file
+from livebode.monitoring.baseline_part import BaselineVersion, retained_file
 from livebode.monitoring.learned_torque import LearnedTorque
 from livebode.monitoring.machine import LearnedMachine
-from livebode.monitoring.rows import PLACES, places
-from livebode.monitoring.table import ScheduleTable
+from livebode.monitoring.table import PLACES, ScheduleTable, places
 
 _ON = {True: "on", False: "off"}
 

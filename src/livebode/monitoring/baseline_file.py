@@ -16,17 +16,22 @@ from numpy.typing import NDArray
 
 from livebode.core import BaselineError, Lines, LivebodeError, write_whole, writing
 from livebode.monitoring.amplitude import InputAmplitude
-from livebode.monitoring.baseline_part import BaselinePart
-from livebode.monitoring.baseline_version import BaselineVersion
+from livebode.monitoring.baseline_part import (
+    BaselinePart,
+    BaselineVersion,
+    accuracy_of,
+    accuracy_plain,
+    as_list,
+    table_of,
+    table_plain,
+)
 from livebode.monitoring.between_runs import BetweenRuns
 from livebode.monitoring.covariates import Covariates
 from livebode.monitoring.learned_torque import LearnedTorque
 from livebode.monitoring.machine import LearnedMachine
-from livebode.monitoring.order_amplitudes import TorqueNoise
 from livebode.monitoring.ripple import Ripple
 from livebode.monitoring.sensitivity import DIRECTIONS
-from livebode.monitoring.table_file import accuracy_of, accuracy_plain, as_list, table_of, table_plain
-from livebode.monitoring.torque_model import TorqueModel
+from livebode.monitoring.torque_model import TorqueModel, TorqueNoise
 from livebode.motion import MovingModel, PositionCurve, Shaft
 from livebode.version import __version__
 

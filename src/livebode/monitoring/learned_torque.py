@@ -10,11 +10,9 @@ import numpy as np
 
 from livebode.arrays import Floats
 from livebode.language import Message
-from livebode.monitoring.order_amplitudes import TorqueNoise, normal_values, powers, together
-from livebode.monitoring.rows import WindowRows
 from livebode.monitoring.stretches import SampleSection
-from livebode.monitoring.table import STILL, ScheduleTable
-from livebode.monitoring.torque_model import StrokeFriction, TorqueModel
+from livebode.monitoring.table import STILL, ScheduleTable, WindowRows
+from livebode.monitoring.torque_model import StrokeFriction, TorqueModel, TorqueNoise, normal_values, powers, together
 from livebode.motion import Shaft
 
 DIRECTIONS = ("forward", "backward")

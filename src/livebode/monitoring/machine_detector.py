@@ -11,21 +11,17 @@ from livebode.arrays import Floats
 from livebode.core import Block, Event, Lines, Stage, StatefulBase
 from livebode.language import Message
 from livebode.monitoring import evidence as word
-from livebode.monitoring.accuracy import ChangeAccuracy
-from livebode.monitoring.active_alarms import ActiveAlarms
-from livebode.monitoring.alarms import Alarm, RecentWindows
+from livebode.monitoring.accuracy import ChangeAccuracy, information_needed
+from livebode.monitoring.alarms import ActiveAlarms, Alarm, RecentWindows
+from livebode.monitoring.between_runs import RunOffset
 from livebode.monitoring.change_date import ChangeDate, date_of, independent, rows_of
 from livebode.monitoring.charts import Charts, threshold
-from livebode.monitoring.detectability import information_needed
 from livebode.monitoring.evidence import Evidence
 from livebode.monitoring.machine import LearnedMachine
 from livebode.monitoring.model_evidence import ModelEvidence
-from livebode.monitoring.monitored_time import WEAK, MonitoredTime
+from livebode.monitoring.monitored_time import WEAK, MonitoredTime, PassedPlaces
 from livebode.monitoring.naming import NamedChange, ScoredWindows, begin_of, candidates, far, lead
-from livebode.monitoring.offset import Offset
-from livebode.monitoring.passed_places import PassedPlaces
-from livebode.monitoring.run_offset import RunOffset
-from livebode.monitoring.sensitivity import DIRECTIONS
+from livebode.monitoring.sensitivity import DIRECTIONS, Offset
 from livebode.monitoring.sentences import (
     about,
     about_far,

@@ -15,9 +15,8 @@ from livebode.monitoring.amplitude import STRONGER
 from livebode.monitoring.covariates import window_means
 from livebode.monitoring.evidence import Evidence
 from livebode.monitoring.machine import LearnedMachine
-from livebode.monitoring.offset import Offset
 from livebode.monitoring.ripple import allowed_for
-from livebode.monitoring.sensitivity import DIRECTIONS, Replay
+from livebode.monitoring.sensitivity import DIRECTIONS, Offset, Replay
 from livebode.monitoring.stretches import LEAD_S, WindowStretch
 from livebode.motion import shaft_position, without_drift
 

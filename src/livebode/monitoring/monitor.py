@@ -13,7 +13,7 @@ from livebode.monitoring._result_sentence import result_sentence
 from livebode.monitoring.baseline import Baseline
 from livebode.monitoring.charts import DEFAULT_INTERVAL_S
 from livebode.monitoring.machine_detector import MachineMonitor
-from livebode.monitoring.rows import NonOverlappingWindows, WindowRows, places
+from livebode.monitoring.table import NonOverlappingWindows, WindowRows, places
 from livebode.monitoring.table_monitor import TableMonitor
 from livebode.monitoring.torque_monitor import TorqueMonitor
 

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from livebode.arrays import Floats
 from livebode.core import BaselineError
 from livebode.monitoring.accuracy import STRETCH, ChangeAccuracy, accuracy
-from livebode.monitoring.rows import WindowRows
-from livebode.monitoring.table import KNOWN, WAYS, WINDOWS_MIN, ScheduleTable, cells
+from livebode.monitoring.table import KNOWN, WAYS, WINDOWS_MIN, ScheduleTable, WindowRows, cells
 
 _BINS = 24
 _SMALLEST = 0.01  # of a magnitude or a parameter; radians of a phase

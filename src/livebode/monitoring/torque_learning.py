@@ -18,10 +18,17 @@ from livebode.monitoring.learned_torque import (
     friction_values,
     order_names,
 )
-from livebode.monitoring.order_amplitudes import TorqueNoise, normal_values, powers, together
 from livebode.monitoring.stretches import SECTION_S, Sections
 from livebode.monitoring.table import FRICTION, ORDERS, STILL, WAYS, WINDOWS_MIN, ScheduleTable
-from livebode.monitoring.torque_model import OrderWindows, StrokeFriction, TorqueModel
+from livebode.monitoring.torque_model import (
+    OrderWindows,
+    StrokeFriction,
+    TorqueModel,
+    TorqueNoise,
+    normal_values,
+    powers,
+    together,
+)
 from livebode.motion import OutputKind, Shaft
 
 Run = Callable[[], Iterable[Block]]

@@ -15,7 +15,7 @@ from livebode.estimation import Settings
 from livebode.motion.chunk import FLAT_M, Chunk, steady_rows
 from livebode.motion.fit import MotionFitOptions, WeightedResponses, sampled
 from livebode.motion.model import MovingModel, PositionCurve
-from livebode.motion.residual import Residual
+from livebode.motion.replay import Residual
 from livebode.motion.standstill import turns
 
 

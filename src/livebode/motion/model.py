@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from livebode.arrays import Floats
 from livebode.kernel import CurveShape, curve_at, curve_splines
 
-_DEGREE = 3
+_DEGREE = 3  # cubic: the stiffness of a belt has no bend
 _SHOWN = 11
 _BEYOND = 0.1  # of the range, on either side, where a curve continues straight
 

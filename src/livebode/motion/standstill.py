@@ -12,7 +12,7 @@ from livebode.core import Event, Responses, Stage, StatefulBase
 from livebode.estimation import Settings
 from livebode.language import Message
 from livebode.motion.chunk import Chunk, steady_rows
-from livebode.motion.residual import Residual
+from livebode.motion.replay import Residual
 
 _UNEXPLAINED = 0.03  # of the output's amplitude at the lines; with dry friction |G| is then off by some 0.7 dB
 _DRAG = 0.01  # of the torque's amplitude at the lines, rms; smaller friction cannot cause the share above

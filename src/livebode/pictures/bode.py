@@ -11,9 +11,8 @@ from livebode.core import Model, Response, Responses, decibels, moment
 from livebode.language import tr, trn
 from livebode.pictures import ticks, words
 from livebode.pictures._style import Style, drawing, empty_note, heading, new_figure, plain, style
-from livebode.pictures.curves import bound_db, bound_deg
+from livebode.pictures.curves import MEAN_PROBABILITY, PROBABILITY, Summary, bound_db, bound_deg, summarised
 from livebode.pictures.plots import FEW_LINES, alone, band, bound
-from livebode.pictures.summary import MEAN_PROBABILITY, PROBABILITY, Summary, summarised
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

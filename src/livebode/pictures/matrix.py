@@ -14,10 +14,9 @@ from livebode.arrays import Floats
 from livebode.core import REASONS, MatrixResponses, decibels, moment
 from livebode.language import tr, worded
 from livebode.pictures._style import Style, drawing, heading, new_figure, plain, shortened, style
-from livebode.pictures.curves import bound_db
+from livebode.pictures.curves import BOUND_C, PROBABILITY, bound_db
 from livebode.pictures.plots import FEW_LINES, alone, bound
 from livebode.pictures.png import save
-from livebode.pictures.summary import BOUND_C, PROBABILITY
 from livebode.pictures.words import lines_phrase
 
 if TYPE_CHECKING:

@@ -16,7 +16,7 @@ from livebode.arrays import Floats
 from livebode.core import Responses, counted
 from livebode.pictures import ticks, words
 from livebode.pictures._style import shortened
-from livebode.pictures.summary import Summary, summarised
+from livebode.pictures.curves import Summary, summarised
 
 _WIDTH_MIN, _HEIGHT_MIN = 40, 16
 _BRAILLE = np.array([[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]])

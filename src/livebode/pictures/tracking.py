@@ -12,8 +12,8 @@ from livebode.core import Responses, decibels
 from livebode.language import numerals, tr
 from livebode.pictures import ticks, words
 from livebode.pictures._style import Style, drawing, empty_note, heading, new_figure, plain, shortened, style
+from livebode.pictures.curves import BOUND_C, PROBABILITY, usable
 from livebode.pictures.map import draw_maps
-from livebode.pictures.summary import BOUND_C, PROBABILITY, usable
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
