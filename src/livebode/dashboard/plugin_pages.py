@@ -1,15 +1,12 @@
-"""What plug-ins add to the page: pages instead of axes, and answers to trials of gains and filters."""
+"""What plug-ins show: pages instead of axes, and parts of the page of a run."""
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
-from livebode.analysis import first_analysis
-from livebode.core import ServerError
-from livebode.dashboard.past import Past
-from livebode.dashboard.quantities import Quantities
+from livebode.plugins import loaded, named
 
 if TYPE_CHECKING:
     from starlette.requests import Request
@@ -17,6 +14,8 @@ if TYPE_CHECKING:
     from starlette.routing import BaseRoute
 
     from livebode.dashboard.board import Board
+    from livebode.dashboard.past import Past
+    from livebode.dashboard.quantities import Quantities
 
 Order = Callable[["Request"], Awaitable["bytes | Response"]]
 
@@ -45,33 +44,47 @@ class PluginPages(Protocol):
         """Update what the pages show until it is cancelled, in the thread of the server."""
 
 
-_MISSING, _REMEDY = "the wing control is not installed", "install this wing too"
+class ShownRun(NamedTuple):
+    """The run of an axis of the page: its record, its quantities, and the run.json that it has or will have."""
+
+    axis: int
+    past: Past
+    quantities: Quantities
+    summary: dict[str, Any]
 
 
-class LoopTrialAnswers(Protocol):
-    """The trials of one board; used in its reading thread."""
-
-    def facts(self, axis: int, past: Past, quantities: Quantities, summary: dict[str, Any]) -> dict[str, Any]:
-        """What the page needs to compute the loop with other gains and filters; `why_not` if nothing can be tried."""
-
-    def steps(self, axis: int, past: Past, quantities: Quantities, text: str) -> dict[str, Any]:
-        """Steps and torque noise before and after, with the gains and filters of the text of the page."""
+Answer = Callable[[ShownRun, Mapping[str, str]], dict[str, Any]]
+"""Plain data for the page, from run and parameters of the request; called in the reading thread of the board."""
 
 
-class NoTrials:
-    """Trials of an installation that has none."""
+class PageAddition(Protocol):
+    """What a plug-in adds to the page of a run; constructed without arguments, for each board.
 
-    def facts(self, *_: object) -> dict[str, Any]:
-        """The reason."""
-        return {"why_not": f"{_MISSING}; {_REMEDY}"}
+    Attributes
+    ----------
+    static
+        Directory of scripts and styles, which are served beside those of the page; the page has all its styles.
+    script
+        File there that exports `addition`, an `Addition` of messages.d.ts.
+    """
 
-    def steps(self, *_: object) -> dict[str, Any]:
-        """ServerError with the reason."""
-        raise ServerError("quantity-unavailable", _MISSING, _REMEDY)
+    static: Path
+    script: str
+
+    def answers(self) -> Mapping[str, Answer]:
+        """The answers by name: `GET /api/NAME?axis=0`."""
 
 
-def loop_trials() -> LoopTrialAnswers:
-    """Answers of the first analysis that has some."""
-    trials = first_analysis("trial") or NoTrials
-    answers: LoopTrialAnswers = trials()
-    return answers
+def page_additions() -> dict[str, type[PageAddition]]:
+    """The additions of all plug-ins by name."""
+    return {name: loaded(reference) for name, reference in named("pages").items()}
+
+
+def files_of_additions() -> dict[str, bytes]:
+    """Their static files, with the script that names them to the page, and their styles as one file."""
+    additions = page_additions()
+    files = {path.name: path.read_bytes() for one in additions.values() for path in sorted(one.static.iterdir())}
+    imports = [f'import {{ addition as {name} }} from "./{one.script}";' for name, one in additions.items()]
+    script = "\n".join([*imports, f"export const ADDITIONS = {{ {', '.join(additions)} }};", ""])
+    styles = b"".join(content for name, content in files.items() if name.endswith(".css"))
+    return files | {"additions.js": script.encode(), "additions.css": styles}

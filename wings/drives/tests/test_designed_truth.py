@@ -13,7 +13,7 @@ import pytest
 from livebode.core import Lines, RecordingError
 from livebode.excitation import Waveform, function_block, multisine
 from livebode_design import write
-from livebode_drives.designed import read_designed
+from livebode_drives.excitation_file import read_designed
 from tests.support.command import livebode
 from tests.support.errors import refused
 from tools.structured_text import Machine
