@@ -154,8 +154,8 @@ main()
 import sys
 sys.modules["livebode_control"] = None
 from pathlib import Path
-from livebode.dashboard import Dashboard, Serving
-dashboard = Dashboard(Serving("127.0.0.1", 0))
+from livebode.dashboard import Dashboard, ServerSettings
+dashboard = Dashboard(ServerSettings("127.0.0.1", 0))
 dashboard.view(Path(sys.argv[1]))
 with dashboard:
     print(dashboard.url, flush=True)
