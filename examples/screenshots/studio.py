@@ -72,7 +72,7 @@ class Studio(ExitStack):
         axis = write_loop(self.folder / "two masses")
         run = axis.parent / "axis"
         livebode = Path(sys.executable).with_name("livebode")
-        for command in (["run", axis, "--out", run], ["check-loop", run], ["tune", run]):
+        for command in (["run", axis, "--out", run], ["validate", run, "--loop"], ["tune", run]):
             subprocess.run([livebode, *command], check=True, stdout=subprocess.DEVNULL)
         return run
 

@@ -14,7 +14,7 @@ import pytest
 
 from livebode.tables import ParquetFile
 
-STORED = Path(__file__).parent / "stored" / "1"
+STORED = Path(__file__).parent / "stored" / "3"
 SOURCE = Path(__file__).parents[2] / "src" / "livebode"
 NEED_IT = {
     "records/_query.py",

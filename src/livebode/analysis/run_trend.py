@@ -137,7 +137,7 @@ class FittedQuantities:
 
 
 def fitted_rows(run: RunRecord) -> FittedQuantities:
-    """The valid fits of a run; of one in segments the newest 64 MiB."""
+    """The valid fits of a run: the newest 64 MiB."""
     found = FittedQuantities()
     for table in run.tables("parameters", _NEWEST_BYTES):
         found.add(table)

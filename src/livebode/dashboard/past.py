@@ -34,7 +34,7 @@ class Past:
     shown
         The newest responses that were sent to browsers.
     readable
-        Whether the record can be read: a run in one piece can be read only after its end.
+        Whether the record can be read: one without a journal can be read only after its end.
     entry
         Of a matrix run: output and input of the responses, such as "velocity2/u1".
     """

@@ -11,7 +11,7 @@ EVERY_S = 0.05
 """At most one response is retained per interval of this many seconds: 2,400 are two minutes."""
 _VALUES_MAX = 1 << 21
 RECORDED_VALUES_MAX = 1 << 13
-"""Responses × lines of a run in segments, about 0.5 MB: older ones are in the record, and there may be many axes."""
+"""Responses × lines of a run with a journal, about 0.5 MB: older ones are in the record, and there may be many axes."""
 _PARTS_MAX = 16
 _SLACK = 1.25
 

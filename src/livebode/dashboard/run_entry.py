@@ -15,8 +15,7 @@ from livebode.core import LEVELS, LivebodeError, RunClock
 from livebode.dashboard.alarm_history import limited
 from livebode.language import for_page, recorded
 from livebode.monitoring import result_tone
-from livebode.records import RUN, Manifest, open_read, read_notes, read_summary, what_is_wrong
-from livebode.tables import read_footer
+from livebode.records import RUN, Manifest, read_notes, read_summary, what_is_wrong
 
 RunState = Literal["finished", "recording", "stopped", "broken"]
 _GROWS_S = 10.0
@@ -203,13 +202,10 @@ def _begun(run: Path, summary: dict[str, Any]) -> float | None:
 
 
 def _first_s(run: Path) -> float | None:
-    """Time of the first response: from the manifest, or from the foot of the table, which is not read itself."""
+    """Time of the first response, from the manifest."""
     try:
-        if (run / "open").is_dir():
-            return next((s.first_s for s in Manifest.read(run).segments if s.table == "responses"), None)
-        with open_read(run, "responses.parquet") as file:
-            return read_footer(file).statistics(0, "time_s").minimum
-    except (LivebodeError, OSError, ValueError, LookupError):
+        return next((s.first_s for s in Manifest.read(run).segments if s.table == "responses" and s.rows), None)
+    except (LivebodeError, OSError):
         return None
 
 

@@ -93,7 +93,7 @@ class State:
 
     @property
     def readable(self) -> bool:
-        """Whether the record can be read: in segments at any time, in one piece after the end of the run."""
+        """Whether the record can be read: with a journal at any time, without one after the end of the run."""
         return not self.live or "record" in self._summary
 
     def begin(self, directory: Path, summary: Mapping[str, Any]) -> None:

@@ -1,5 +1,6 @@
 // @ts-check
 // The page: messages from the server go to the panels, actions of the person go to the server.
+import { ADDITIONS } from "./additions.js";
 import { chosen, enter, remember } from "./address.js";
 import { alarmMoment } from "./alarmmoment.js";
 import { Bode } from "./bode.js";
@@ -36,7 +37,6 @@ import { Trends } from "./trends.js";
 import { lamp } from "./verdict.js";
 import { viewMenu } from "./view-menu.js";
 import { Wall } from "./wall.js";
-import { WhatIfCard } from "./whatif-card.js";
 import { worded } from "./worded.js";
 import { named } from "./words.js";
 import { zoneChoice } from "./zone.js";
@@ -295,7 +295,7 @@ function begin({ facts, axes, trends }) {
     map.begin(facts, page.schedule);
     fill();
     saved.fetch();
-    page.dirty.add("trial");
+    page.dirty.add("additions");
   }
   const gone = other && references.stored.size > 0;
   if (gone) references.releaseAll();
@@ -305,7 +305,7 @@ function begin({ facts, axes, trends }) {
   mapOver.disable("position", facts.schedule ? "" : NO_POSITION);
   drawLegend();
   matrix.begin(facts);
-  whatIf.begin();
+  for (const part of Object.values(additions)) part.begin();
   parameters.begin(trends);
   margins.begin(trends, whyNoMargins(facts));
   marginTrends.begin(trends);
@@ -418,7 +418,7 @@ function draw(now) {
     return true;
   };
   if (due("bode", 0)) bode.draw();
-  if (due("trial", 0)) whatIf.draw();
+  if (due("additions", 0)) for (const part of Object.values(additions)) part.draw();
   if (due("read", TEXT_MS) && page.read) readout($("readout"), ...page.read, page.schedule, bode);
   if (due("rows", TRACK_MS)) drawRows(now);
   if (page.tab === "map" && page.seen && due("map", timeline.atS === null ? MAP_MS : 0)) {
@@ -457,12 +457,14 @@ const matrix = new Matrix(page, timeline, {
   },
   complain,
 });
-const whatIf = new WhatIfCard(page, bode, { watch, complain });
+const additions = Object.fromEntries(
+  Object.entries(ADDITIONS).map(([name, added]) => [name, added(page, bode, { watch, complain })]),
+);
 const operator = () => page.facts?.role === "operator";
 const curves = curvesMenu($("bode-curves"), $("bode-curves-panel"), { bode, references, saved, operator, complain });
 const showClock = zoneChoice($("clock", HTMLSelectElement));
 const lost = new Lost($("lost"));
 describe(page, { bode, tracking, map, trends: [parameters, marginTrends] });
 onClock(newClock);
-window.livebode = { page, ...parts, parameters, margins, marginTrends, saved, zoom, whatIf, matrix };
+window.livebode = { page, ...parts, parameters, margins, marginTrends, saved, zoom, matrix, ...additions };
 requestAnimationFrame(draw);

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 _COLUMNS = ("quantity", "first", "second", "difference", "in %", "unit", "runs")
 
 
-@with_selection("since", "until", "covariate", "recipe")
+@with_selection("since", "until", "covariate")
 def compare_command(
     archive: LakeOf,
     first: Annotated[str, typer.Argument(metavar="AXIS", help="site/line/machine/axis.")],

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 _REFUSED = 2
 
 
-@with_selection("below", "since", "until", "recipe")
+@with_selection("below", "since", "until")
 def learn_command(
     archive: LakeOf,
     chosen: SelectionOptions,
@@ -48,7 +48,6 @@ def learn_command(
             "are retained in NAME.history beside it.",
         ),
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace existing files; a baseline is retained.")] = False,
     as_json: Json = False,
 ) -> None:
     """Learn a baseline of one machine, or of each machine of a hall, from its healthy runs in the lake.
@@ -65,16 +64,16 @@ def learn_command(
 
     settings = _settings(archive)
     lake = Lake(settings.lake if settings else lake_url(archive))
-    of = replace(chosen, recipe=chosen.recipe or _recipe(settings)).selection()
+    of = replace(chosen, recipe=_recipe(settings)).selection()
     axes = healthy_runs(lake, of.without(contents_of(lake, exclude or ())))
     files = _files(axes, out or (settings.baselines if settings else None), each=each)
     for file in files:
-        check_replaceable(file, reason, force=force)
+        check_replaceable(file, reason, force=False)
     learned: list[dict[str, Any]] = []
     refused: dict[str, LivebodeError] = {}
     for one, file in zip(axes, files):
         try:
-            learned.append(_learned(lake, one, file, reason, accept=accept, force=force))
+            learned.append(_learned(lake, one, file, reason, accept=accept))
         except LivebodeError as error:
             if not each:
                 raise
@@ -143,9 +142,7 @@ def _files(axes: Sequence[HealthyRuns], text: str | None, *, each: bool) -> list
     return [Path(file) for file in files if file is not None]
 
 
-def _learned(
-    lake: Lake, of: HealthyRuns, file: Path, reason: str | None, *, accept: bool, force: bool
-) -> dict[str, Any]:
+def _learned(lake: Lake, of: HealthyRuns, file: Path, reason: str | None, *, accept: bool) -> dict[str, Any]:
     from livebode.cli import write_baseline
     from livebode_plant.archive.learning import learn_of_lake  # with the simulation
 
@@ -156,7 +153,7 @@ def _learned(
     read = {name: getattr(learned, name) for name in ("responses", "recordings", "size_bytes")}
     remarks = [*of.remarks, *(of.doubts if accept else ())]
     own = {"machine": of.axis, "read": read, "remarks": remarks}
-    return own | write_baseline(learned.baseline, file, reason, force=force)
+    return own | write_baseline(learned.baseline, file, reason, force=False)
 
 
 def _print(one: dict[str, Any], *, short: bool) -> None:

@@ -13,6 +13,7 @@ _COLUMNS = ("machine", "runs", "judged", "alarming", "quarantined", "first", "la
 
 
 def list_command(
+    context: typer.Context,
     archive: LakeOf,
     quarantined: Annotated[
         bool, typer.Option("--quarantined", help="List the recordings in quarantine, with the reason of each.")
@@ -38,8 +39,8 @@ def list_command(
     from livebode_plant.archive.contents import machines, quarantine
     from livebode_plant.lake import Lake
 
+    check_query(context, as_csv=as_csv, as_json=as_json)
     lake = Lake(lake_url(archive))
-    check_query(sql, as_csv=as_csv, as_json=as_json, others={"--quarantined": quarantined})
     if sql is not None:
         from livebode_plant.lake.query import query_lake
 

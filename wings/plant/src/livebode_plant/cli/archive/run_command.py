@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 import typer
 
-from livebode.cli import Json, console
-from livebode.core import UsageError
+from livebode.cli import Json, check_use, console
 from livebode_plant.cli.archive.selection import LakeOf
 
 if TYPE_CHECKING:
@@ -21,6 +20,7 @@ if TYPE_CHECKING:
 
 
 def run_command(
+    context: typer.Context,
     archive: LakeOf,
     retry: Annotated[
         Literal["all", "older"] | None,
@@ -43,13 +43,7 @@ def run_command(
     command continues. Files that no table has are removed by --compact when they are older than a week: an archive that
     runs now loses none. A table with results that are not complete is left as it is.
     """
-    if compact and retry is not None:
-        raise UsageError(
-            "conflict",
-            "--retry and --compact exclude each other",
-            "give them one after the other",
-            options=["--retry", "--compact"],
-        )
+    check_use(context, "--compact", ())
     if compact:
         _compact(archive, as_json=as_json)
     elif retry is not None:

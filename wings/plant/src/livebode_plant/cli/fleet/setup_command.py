@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from livebode.cli import Json
+from livebode.cli import Json, check_use
 from livebode.core import UsageError
 
 if TYPE_CHECKING:
@@ -17,6 +17,7 @@ _USERS = ("edge:PATH", "fleet", "view")
 
 
 def setup_command(
+    context: typer.Context,
     fleet: Annotated[
         Path | None, typer.Argument(metavar="FLEET.TOML", help="Configuration of the fleet; not for --user.")
     ] = None,
@@ -56,6 +57,7 @@ def setup_command(
             f"the users are {', '.join(_USERS)}",
             options=["--user"],
         )
+    check_use(context, "--user USER", ("--out",))
     if fleet is None:
         _write_key(user or "", out, as_json=as_json)
         return
