@@ -72,7 +72,7 @@ class Studio(ExitStack):
         axis = write_loop(self.folder / "two masses")
         run = axis.parent / "axis"
         livebode = Path(sys.executable).with_name("livebode")
-        for command in (["run", axis, "--out", run], ["check-loop", run], ["tune", run]):
+        for command in (["run", axis, "--out", run], ["validate", run, "--loop"], ["tune", run]):
             subprocess.run([livebode, *command], check=True, stdout=subprocess.DEVNULL)
         return run
 
@@ -141,9 +141,8 @@ class Studio(ExitStack):
     @cached_property
     def fleet_url(self) -> str:
         """A simulated fleet with a floor plan, and a year of AXIS; one of its partitions has no worker."""
-        from livebode_plant.page.fleet_demo import DemoFeed, DemoFleet
-        from livebode_plant.page.fleet_pages import FleetSite
-        from livebode_plant.page.fleet_view import FleetView
+        from livebode_plant.page.fleet_feed import DemoFeed, DemoFleet
+        from livebode_plant.page.fleet_pages import FleetView
         from livebode_plant.page.floor_plan import floor_plan
 
         fleet, lake = DemoFleet(10_000), self.folder / "lake"
@@ -151,7 +150,7 @@ class Studio(ExitStack):
         status = fleet.status(150.0, time.time())
         write_year(lake, AXIS, float(status["value"][fleet.paths.index(AXIS)]))
         dashboard = Dashboard(Serving("127.0.0.1", 0))
-        dashboard.show(FleetSite(FleetView(feed, floor_plan(_PLAN), lake=str(lake))))
+        dashboard.show(FleetView(feed, floor_plan(_PLAN), lake=str(lake)))
         return self.enter_context(dashboard).url
 
     def page(

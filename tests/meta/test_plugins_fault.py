@@ -7,13 +7,16 @@ import subprocess
 import sys
 from importlib.metadata import entry_points
 from pathlib import Path
+from urllib.parse import urljoin
 
 import numpy as np
 import pytest
+from playwright.sync_api import Browser
 
 from livebode import plugins
 from livebode_drives.formats import FORMATS
 from tests.support import recordings
+from tests.support.browser import Tab
 from tests.support.command import signals, write_parquet
 
 BROKEN = {
@@ -126,15 +129,13 @@ def test_a_wing_that_was_left_out_is_no_fault(tmp_path: Path) -> None:
     assert "cannot be loaded" not in done.stderr
 
 
-def test_without_the_wing_control_a_run_has_its_report_and_the_page_the_reason(tmp_path: Path) -> None:
+def test_without_the_wing_control_a_run_has_its_report_and_its_page(tmp_path: Path, browser: Browser) -> None:
     log = write_parquet(tmp_path / "log.parquet", signals())
     given = ["--excitation", "w", "--input", "u", "--output", "y", "--lines", "50,100,200", "--window", "100"]
     code = """
 import sys
 sys.modules["livebode_control"] = None
 from livebode.cli import main
-from livebode.dashboard.trials import loop_trials
-print(loop_trials().facts())
 main()
 """
 
@@ -145,11 +146,31 @@ main()
     assert without("run", log, *given, "--out", tmp_path / "run").returncode == 0
     done = without("report", tmp_path / "run")
     assert (done.returncode, done.stderr) == (0, "")
-    assert "the wing control is not installed" in done.stdout
     assert "No such command 'tune'" in without("tune", tmp_path / "run").stderr
     done = without("report", tmp_path / "run", "--on", log)
     assert (done.returncode, done.stderr.count("\n")) == (2, 1)
     assert "a model is tested by the wing control, which is not installed; install the wing control" in done.stderr
+    serve = """
+import sys
+sys.modules["livebode_control"] = None
+from pathlib import Path
+from livebode.dashboard import Dashboard, Serving
+dashboard = Dashboard(Serving("127.0.0.1", 0))
+dashboard.view(Path(sys.argv[1]))
+with dashboard:
+    print(dashboard.url, flush=True)
+    sys.stdin.read()
+"""
+    command = [sys.executable, "-c", serve, str(tmp_path / "run")]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as server:
+        assert server.stdout is not None
+        with Tab(browser, server.stdout.readline().strip()) as tab:
+            tab.until("bode.drawn.measured")
+            assert tab.page.locator("#bode-curves").count() == 1
+            assert tab.page.locator("[id*=what-if]").count() == 0
+            assert tab.page.request.get(urljoin(tab.page.url, "/api/loop?axis=0")).status == 404
+            assert tab.wrong == []
+        server.communicate()
 
 
 @pytest.mark.parametrize("kind", [format_.reader.partition(":")[0].rpartition(".")[2] for format_ in FORMATS])

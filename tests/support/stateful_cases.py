@@ -43,7 +43,7 @@ from livebode.simulation import BeltAxis, Sensor, SimulatedAxis, Strokes, Tensio
 from livebode.sources.live import Batch, LiveBlock, Origin, Sequencer, SourceEvents
 from livebode.sources.live.kernel_drive import KernelDrive
 from livebode_matrix import MatrixMonitor, MatrixSettings, MatrixTracker, example_matrix_responses
-from livebode_matrix.columns import MatrixColumns
+from livebode_matrix.response_matrix import MatrixColumns
 from livebode_matrix.detection import MatrixDetection
 from livebode_plant.fleet.axis_stream import AxisStream
 from livebode_plant.fleet.message import write_message

@@ -5,7 +5,7 @@ from __future__ import annotations
 import gc
 import pickle
 from collections.abc import Callable
-from functools import cache
+from functools import cache, cached_property
 from importlib.metadata import version
 from types import SimpleNamespace
 from typing import Any
@@ -78,7 +78,7 @@ class Unit:
                 self.kinds[name], self.initial[name] = _kind(item.init)
                 self.places[name] = place
 
-    @property
+    @cached_property
     def inputs(self) -> dict[str, tuple[Kind, bool]]:
         """Type of each, and whether every call must give it."""
         return {n: (self.kinds[n], p == "in_out") for n, p in self.places.items() if p in ("input", "in_out")}

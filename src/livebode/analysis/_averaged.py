@@ -5,15 +5,18 @@ from __future__ import annotations
 import threading
 from dataclasses import dataclass
 from math import inf
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode import fitting
 from livebode.core import PlantKinds, Response, Responses
 from livebode.estimation import Movement
-from livebode.fitting import RecordingsMean, RunningMean
 from livebode.language import Message
-from livebode.records import RunRecord
+
+if TYPE_CHECKING:
+    from livebode.records import RunRecord
 
 ROWS_MAX = 2048
 LIVE_VALUES_MAX = 1 << 13
@@ -122,7 +125,7 @@ def averaged(run: RunRecord) -> Averaged:
         overview.add(part)
         counted.add(part)
     one, words = mean.response()[0], Message("the mean of {responses} responses", responses=mean.rows)
-    if isinstance(mean, RecordingsMean):
+    if isinstance(mean, fitting.RecordingsMean):
         words = Message("{mean} in {recordings} recordings", mean=words, recordings=len(run.found["recordings"]))
     if mean.averages:
         end_s = counted.begin_s + (one.sample + 1) / run.lines.rate_hz
@@ -150,13 +153,13 @@ def averaged(run: RunRecord) -> Averaged:
     return Averaged(**{**found.__dict__, "words": words})
 
 
-def running_mean(run: RunRecord) -> RunningMean | RecordingsMean:
+def running_mean(run: RunRecord) -> fitting.RunningMean | fitting.RecordingsMean:
     """A mean for all responses of the run: of several recordings that of their means."""
     recordings = run.found.get("recordings") or ()
     if not recordings:
-        return RunningMean()
+        return fitting.RunningMean()
     starts = [recording["first"] for recording in recordings]
-    return RecordingsMean(starts, realisations=bool(run.found.get("realisations")))
+    return fitting.RecordingsMean(starts, realisations=bool(run.found.get("realisations")))
 
 
 def mean_of(run: RunRecord) -> Responses:

@@ -34,20 +34,13 @@ def dashboard_of(section: ServeSection, port: int | None) -> Dashboard:
 
 @contextmanager
 def served(
-    required: bool,
-    section: ServeSection,
-    port: int | None,
-    entries: Mapping[str, Sequence[tuple[str, str]]],
-    stays: bool,
+    section: ServeSection, port: int | None, entries: Mapping[str, Sequence[tuple[str, str]]], stays: bool
 ) -> Iterator[SubscribersOf]:
-    """A function that returns the subscribers of an axis by its name: the dashboard, or nobody.
+    """A function that returns the subscribers of an axis by its name: the dashboard.
 
     `entries` has the axes that exist from the beginning, with the entries of their matrices; `stays` serves the page
     after the run until Ctrl-C.
     """
-    if not required:
-        yield lambda _: ()
-        return
     dashboard = dashboard_of(section, port)
 
     def hub(name: str) -> Subscriber:

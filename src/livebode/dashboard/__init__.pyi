@@ -17,9 +17,11 @@ from livebode.dashboard.dashboard import listening as listening
 from livebode.dashboard.hub import Hub as Hub
 from livebode.dashboard.overlays import grid_hz as grid_hz
 from livebode.dashboard.past import Past as Past
+from livebode.dashboard.plugin_pages import Answer as Answer
 from livebode.dashboard.plugin_pages import Order as Order
+from livebode.dashboard.plugin_pages import PageAddition as PageAddition
 from livebode.dashboard.plugin_pages import PluginPages as PluginPages
+from livebode.dashboard.plugin_pages import ShownRun as ShownRun
 from livebode.dashboard.quantities import Quantities as Quantities
 from livebode.dashboard.queries import json_object as json_object
 from livebode.dashboard.server_settings import Serving as Serving
-from livebode.dashboard.trials import LoopTrialAnswers as LoopTrialAnswers

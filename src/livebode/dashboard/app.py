@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -26,13 +27,12 @@ from livebode.dashboard.frames import frame
 from livebode.dashboard.guard import Guard, body
 from livebode.dashboard.matrix_answer import matrix_answer
 from livebode.dashboard.past import Past
-from livebode.dashboard.plugin_pages import PluginPages
+from livebode.dashboard.plugin_pages import Answer, PluginPages, ShownRun, files_of_additions, page_additions
 from livebode.dashboard.queries import SavedChange
 from livebode.dashboard.runs_pages import RunsPages
 from livebode.dashboard.server_settings import Serving
 from livebode.dashboard.signals import signals
 from livebode.dashboard.state import State
-from livebode.dashboard.trials import loop_trials
 from livebode.language import Message, catalogue_for_page, negotiated
 from livebode.plugins import loaded
 from livebode.records import SavedCurves, change_saved, read_saved
@@ -107,8 +107,6 @@ def _page_routes(pages: _Pages) -> list[BaseRoute]:
         Route("/api/past", pages.past),
         Route("/api/moment", pages.moment),
         Route("/api/signals", pages.signals),
-        Route("/api/loop", pages.loop),
-        Route("/api/steps", pages.steps),
         Route("/api/matrix", pages.matrix),
         Route("/api/export", pages.export),
         Route("/api/acknowledge", pages.acknowledge, methods=["POST"]),
@@ -117,6 +115,7 @@ def _page_routes(pages: _Pages) -> list[BaseRoute]:
         Route("/api/saved", pages.saved, methods=["GET"]),
         Route("/api/saved", pages.change_saved, methods=["POST"]),
         WebSocketRoute("/live", pages.live),
+        *pages.routes_of_additions(),
     ]
 
 
@@ -126,7 +125,6 @@ class _Pages:
     def __init__(self, board: Board, serving: Serving, files: dict[str, tuple[bytes, str]]) -> None:
         self._board, self._secure, self._language = board, serving.tls is not None, serving.language
         self.files = files
-        self._trials = loop_trials()
 
     async def page(self, request: Request) -> Response:
         if self._role(request) is None:
@@ -190,19 +188,17 @@ class _Pages:
         found = await signals(self._board, self._begun(asked.axis), asked)
         return Response(found, media_type="application/octet-stream")
 
-    async def loop(self, request: Request) -> Response:
-        """The controllers and the plant with its bounds, from which the page computes other gains and filters."""
-        if (state := self._asked_state(request)) is None:
-            return _unknown()
-        job, asked = self._trials.facts, (state.axis, Past.of(state), state.quantities, dict(state.summary))
-        return JSONResponse(await self._board.elsewhere(job, *asked))
+    def routes_of_additions(self) -> list[BaseRoute]:
+        """The requests that the additions of the page answer, from one object of each for this board."""
+        answers = {name: answer for kind in page_additions().values() for name, answer in kind().answers().items()}
+        return [Route(f"/api/{name}", partial(self._addition, answer)) for name, answer in answers.items()]
 
-    async def steps(self, request: Request) -> Response:
-        """Steps and torque noise of the described loop and of the gains and filters that a person tries."""
+    async def _addition(self, answer: Answer, request: Request) -> Response:
         if (state := self._asked_state(request)) is None:
             return _unknown()
-        job, text = self._trials.steps, request.query_params.get("trial", "")
-        return JSONResponse(await self._board.elsewhere(job, state.axis, Past.of(state), state.quantities, text))
+        assert state.quantities is not None  # the run has begun
+        run = ShownRun(state.axis, Past.of(state), state.quantities, dict(state.summary))
+        return JSONResponse(await self._board.elsewhere(answer, run, request.query_params))
 
     async def matrix(self, request: Request) -> Response:
         """The newest matrix of the run that an axis is an entry of, or the one nearest to a time."""
@@ -321,13 +317,12 @@ class _Pages:
 
 def _files(others: PluginPages | None) -> dict[str, tuple[bytes, str]]:
     """Content and type of the static files, in memory: reading a file would take a thread for each request."""
-    found = {}
     folders = [(_HERE / "static", ""), (_HERE / "_vendor" / "uplot", "uplot/")]
-    for folder, prefix in folders if others is None else [*folders, (others.static, "")]:
-        for path in folder.iterdir():
-            if kind := _FILE_TYPES.get(path.suffix):
-                found[prefix + path.name] = path.read_bytes(), kind
-    return found
+    if others is not None:
+        folders.append((others.static, ""))
+    files = {prefix + path.name: path.read_bytes() for folder, prefix in folders for path in folder.iterdir()}
+    files |= files_of_additions()
+    return {name: (content, kind) for name, content in files.items() if (kind := _FILE_TYPES.get(Path(name).suffix))}
 
 
 def _as(state: State, responses: Responses, span: queries.Span) -> Responses:

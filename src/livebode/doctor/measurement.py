@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from livebode.configuration import Axis, open_even_or_uneven, open_recording
+from livebode.configuration import Axis, open_recordings, with_log
 from livebode.core import LivebodeError, counted
 from livebode.doctor.check import Check
 from livebode.doctor.subject import Subject
@@ -27,13 +27,12 @@ def check_recording(name: str, axis: Axis, path: Location) -> Check:
             return Check(name, "failed", f"{path} cannot be read", "check its permissions", facts)
     if axis.source.follow:
         return Check(name, "ok", f"{path} can be read", facts=facts)
-    own = axis.model_copy(update={"source": axis.source.model_copy(update={"log": path})})
     signals = axis.signals
     roles = [name for role in ("excitation", "input", "output") for name in signals.listed(role)]
     names = [*roles, signals.schedule, *axis.monitoring.covariates]
-    opened = open_recording if signals.is_matrix else open_even_or_uneven  # matrices need one clock
     try:
-        channels = contents_of(opened(own), list(dict.fromkeys(filter(None, names)))).channels
+        _, (log,) = open_recordings(with_log(axis, path))
+        channels = contents_of(log, list(dict.fromkeys(filter(None, names)))).channels
     except LivebodeError as error:
         return Check.of_error(name, error)
     silent = [_silence(channel) for channel in channels if not channel.minimum < channel.maximum]

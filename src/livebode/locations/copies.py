@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import Any
 
 from livebode.core import LivebodeError, LocationError, remove_created, why
-from livebode.locations.storage import in_pieces, opened, reporting
 from livebode.locations.url import Url, location
 
 _logger = logging.getLogger(__name__)
@@ -47,6 +46,8 @@ class LocalCopy:
     """
 
     def __init__(self, url: Url) -> None:
+        from livebode.locations.storage import opened, reporting
+
         system, source = opened(url)
         self.url = url
         self.path = temporary_place(url)
@@ -166,6 +167,8 @@ def _files(system: Any, source: str) -> Iterable[tuple[str, dict[str, Any]]]:
 
 
 def _get(url: Url, system: Any, source: str, to: Path) -> None:
+    from livebode.locations.storage import in_pieces
+
     try:
         system.get_file(source, str(to), **in_pieces(url))
     except OSError as error:

@@ -1,4 +1,4 @@
-"""loop-check.json: the result of the newest `livebode check-loop` of a run, beside its data."""
+"""loop-check.json: the result of the newest `livebode validate --loop` of a run, beside its data."""
 
 from __future__ import annotations
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 
-from livebode.configuration import NOT_RECORDED, Axis
+from livebode.configuration import NOT_RECORDED, Axis, open_recordings
 from livebode.core import RunClock, moments_by
 from livebode.estimates import rule
 from livebode.runtime.destination import Destination
@@ -35,11 +35,12 @@ def run(axis: Axis, to: Destination, control: RunControl | None = None) -> Outco
     """
     control, started = control or RunControl(), time.perf_counter()
     kind = axis.kind
-    if axis.source.live:
+    named, logs = open_recordings(axis)
+    if not logs:
         from livebode.runtime.live import run_live
 
         return run_live(axis, to, control)
-    of: ExaminedRecording = rule(kind, "recording")(axis, to)
+    of: ExaminedRecording = rule(kind, "recording")(named, logs, to)
     about = {"configuration": of.axis.model_dump(mode="json", exclude=NOT_RECORDED, by_alias=True), "found": of.found}
     about |= provenance(of.axis, of.digests)
     feed = Feed(of.source, control, noticed=of.noticed, recorded=of.recorded, started=started)

@@ -43,9 +43,9 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_a_run_is_tuned_once_its_loop_was_checked(run: Path) -> None:
     refused = livebode("tune", run)
     assert refused.code == 2
-    assert "livebode check-loop" in refused.err
-    assert livebode("check-loop", run).out.startswith("loop checked: as described")
-    done = livebode("tune", run)
+    assert "livebode validate --loop" in refused.err
+    assert livebode("validate", run, "--loop").out.startswith("loop checked: as described")
+    done = livebode("tune", run, pictures=True)
     assert done.code == 0, done.err
     assert "velocity.gain" in done.out
     assert "is promised" in done.out
@@ -60,12 +60,15 @@ def test_a_run_is_tuned_once_its_loop_was_checked(run: Path) -> None:
 
 def test_a_link_in_the_run_is_replaced_and_not_followed(run: Path, tmp_path: Path) -> None:
     (tmp_path / "thesis.tex").write_text("years of work")
-    names = {"tune": ("tune.json", "filters.h", "filters.st", "gains.toml"), "shaper": ("shaper.h", "shaper.cfg")}
-    for command, files in names.items():
+    names = {
+        "--loop-checked": ("tune.json", "filters.h", "filters.st", "gains.toml"),
+        "--shaper": ("shaper.h", "shaper.cfg"),
+    }
+    for option, files in names.items():
         for name in files:
             (run / name).unlink(missing_ok=True)
             (run / name).symlink_to(tmp_path / "thesis.tex")
-        assert livebode(command, run, *(["--loop-checked"] if command == "tune" else [])).code == 0
+        assert livebode("tune", run, option).code == 0
         assert not any((run / name).is_symlink() for name in files)
     assert (tmp_path / "thesis.tex").read_text() == "years of work"
 
@@ -113,9 +116,9 @@ def test_a_description_that_the_check_contradicts_is_never_tuned(run: Path) -> N
     other = run.parent / "gain.toml"
     words = (run.parent / "axis.toml").read_text(encoding="utf-8")
     other.write_text(words.replace("0.2308", "0.3"), encoding="utf-8")
-    assert "livebode check-loop" in livebode("tune", run, "--axis", other).err
+    assert "livebode validate --loop" in livebode("tune", run, "--axis", other).err
     assert livebode("tune", run, "--axis", other, "--loop-checked").code == 0
-    assert "loop.velocity.gain" in livebode("check-loop", run, "--axis", other).out
+    assert "loop.velocity.gain" in livebode("validate", run, "--loop", "--axis", other).out
     for more in ((), ("--loop-checked",)):
         done = livebode("tune", run, "--axis", other, *more)
         assert done.code == 2
@@ -196,7 +199,7 @@ def test_gains_over_the_schedule_are_proposed_from_stops_at_places(tmp_path: Pat
     words = words.replace('output = "y"', 'output = "velocity"\nschedule = "x"')
     (tmp_path / "axis.toml").write_text(words, encoding="utf-8")
     assert livebode("run", tmp_path / "axis.toml", "--out", tmp_path / "run").code == 0
-    done = livebode("tune", tmp_path / "run", "--loop-checked", "--schedule")
+    done = livebode("tune", tmp_path / "run", "--loop-checked", "--schedule", pictures=True)
     assert done.code == 0, done.err
     assert "gains over the schedule" in done.out
     rows = (tmp_path / "run" / "gains.csv").read_text(encoding="utf-8").splitlines()
@@ -206,7 +209,7 @@ def test_gains_over_the_schedule_are_proposed_from_stops_at_places(tmp_path: Pat
 
 def test_input_shapers_are_proposed_for_the_load_of_a_stiff_drive(run: Path) -> None:
     """The load of the true belt swings at 43.48 Hz with a damping of 0.0355 while the motor is held."""
-    done = livebode("shaper", run, "--axis", "y", "--json")
+    done = livebode("tune", run, "--shaper", "--klipper-axis", "y", "--json")
     assert done.code == 0, done.err
     found = json.loads(done.out)
     assert found["mode"]["low_hz"] < 43.48 < found["mode"]["high_hz"]
@@ -215,5 +218,5 @@ def test_input_shapers_are_proposed_for_the_load_of_a_stiff_drive(run: Path) -> 
     assert best["worst"] <= 0.05
     assert "shaper_freq_y: 43" in (run / "shaper.cfg").read_text(encoding="utf-8")
     assert "LIVEBODE_SHAPER" in (run / "shaper.h").read_text(encoding="utf-8")
-    assert "proposed" in livebode("shaper", run).out
-    assert "no parameter 'wobble'" in livebode("shaper", run, "--mode", "wobble").err
+    assert "proposed" in livebode("tune", run, "--shaper").out
+    assert "no parameter 'wobble'" in livebode("tune", run, "--shaper", "--mode", "wobble").err

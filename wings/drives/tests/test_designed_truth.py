@@ -14,7 +14,7 @@ from livebode.core import Lines, RecordingError
 from livebode.excitation import Waveform, multisine
 from livebode.structured_text import multisine as block_text
 from livebode_design import write
-from livebode_drives.designed import read_designed
+from livebode_drives.excitation_file import read_designed
 from tests.support.command import livebode
 from tests.support.errors import refused
 from tools.structured_text import Machine

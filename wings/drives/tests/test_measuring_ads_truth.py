@@ -16,7 +16,7 @@ from livebode.records import RunRecord
 from livebode.runtime import Destination, run
 from livebode_design import Experiment, Prepared, design_experiment, measure, prepare
 from livebode_design.playback import StopRequest
-from livebode_drives.designed import read_designed
+from livebode_drives.excitation_file import read_designed
 from tests.support.command import write_csv
 from tests.support.errors import refused
 from tests.support.peers.peer import Feeding, until

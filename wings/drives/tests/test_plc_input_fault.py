@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 
 from livebode.core import Lines, UsageError
 from livebode.structured_text import multisine
-from livebode_drives.structured_text.project import Project
-from livebode_drives.structured_text.ring import ring_block, ring_type
+from livebode_drives.structured_text.project import Project, ring_block, ring_type
 from livebode_drives.structured_text.sliding_dft import sliding_dft
 from tests.support.command import livebode
 from tests.support.errors import refused

@@ -15,9 +15,8 @@ from livebode.core import Lines
 from livebode.kernel import SlidingDFT
 from livebode.structured_text import as_name, check_name, multisine
 from livebode.structured_text.names import NAME_LENGTH_MAX
-from livebode_drives.live.ring import HEADER, read_ring
-from livebode_drives.structured_text.project import Project
-from livebode_drives.structured_text.ring import ring_block, ring_type
+from livebode_drives.live.ads import HEADER, read_ring
+from livebode_drives.structured_text.project import Project, ring_block, ring_type
 from livebode_drives.structured_text.sliding_dft import sliding_dft
 from livebode_drives.structured_text.twincat import twincat
 from tools.structured_text import Machine, parse

@@ -37,7 +37,7 @@ class MatrixBaseline:
 
     @classmethod
     def load(cls, path: Path) -> MatrixBaseline:
-        """Of the run in this directory; BaselineError if there is none, or it has no valid matrices."""
+        """The run in this directory as a baseline; BaselineError if there is none, or it has no valid matrices."""
         if not path.exists():
             raise BaselineError("absent", f"there is no baseline {str(path)!r}", _NAME_A_RUN, path=str(path))
         try:

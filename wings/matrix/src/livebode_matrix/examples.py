@@ -48,7 +48,7 @@ MATRIX_EXAMPLES = {
         ("gantry-tune.toml",),
         (
             "livebode run gantry-tune.toml",
-            "livebode check-loop runs/gantry-tune",
+            "livebode validate runs/gantry-tune --loop",
             "livebode tune runs/gantry-tune --entry velocity1/u1",
         ),
         package="livebode_matrix",

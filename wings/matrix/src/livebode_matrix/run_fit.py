@@ -16,5 +16,5 @@ def fit_matrix_run(
     responses = run.matrix()
     band = None if section.band_hz is None else (section.band_hz[0], section.band_hz[1])
     mean = mean_matrix(responses)
-    found = fit_matrix(responses, model, order=order, band_hz=band, hold=section.hold)
-    return found, [f"fitted to the mean of the matrices that share no window, {mean.dof[0]:.0f} degrees of freedom"]
+    fit = fit_matrix(responses, model, order=order, band_hz=band, hold=section.hold)
+    return fit, [f"fitted to the mean of the matrices that share no window, {mean.dof[0]:.0f} degrees of freedom"]

@@ -1,4 +1,4 @@
-"""`livebode archive trend` and `archive report` on the lake of a simulated hall, whose faults are known."""
+"""`livebode archive trend` and `archive compare` on the lake of a simulated hall, whose faults are known."""
 
 from __future__ import annotations
 
@@ -69,12 +69,29 @@ def test_a_picture_and_a_table_are_written_once(hall: Path, tmp_path: Path) -> N
         (["Keff", "--out", "year.jpg"], "neither a .png nor a .csv"),
         (["Keff", "--machine", "B", "--out", "year.png"], "no machine has a trend to draw"),
         (["Keff", "--covariate", "temp"], "did you mean 'temperature'?"),
+        (["--by", "axis"], "--by is for one quantity; name a QUANTITY, or omit it"),
+        (["--dark"], "--dark is for one quantity"),
+        (["Keff", "--name", "Hall 1"], "--name is for the page of all quantities; leave out the QUANTITY, or omit it"),
+        (["Keff", "--language", "de"], "--language is for the page of all quantities"),
     ],
 )
 def test_a_wrong_word_is_one_sentence_with_what_to_do(hall: Path, words: list[str], said: str) -> None:
     refused = livebode("archive", "trend", hall, *words)
     assert (refused.code, refused.err.count("\n")) == (2, 1)
     assert said in refused.err
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["list", "HALL", "--sql", "SELECT 1", "--quarantined"], "--quarantined and --sql exclude each other"),
+        (["list", "HALL", "--rows", "3"], "--rows belongs to --sql"),
+        (["run", "HALL", "--retry", "all", "--compact"], "--retry and --compact exclude each other"),
+    ],
+)
+def test_an_option_of_the_other_use_is_refused(hall: Path, words: list[str], says: str) -> None:
+    refused = livebode("archive", *(hall if word == "HALL" else word for word in words))
+    assert (refused.code, says in refused.err) == (2, True), refused
 
 
 @pytest.mark.parametrize(

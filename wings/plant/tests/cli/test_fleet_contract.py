@@ -120,6 +120,8 @@ def test_the_configuration_of_the_server_has_the_limits_and_the_partitions(tmp_p
         (["status"], "give either FLEET.toml or --demo AXES"),
         (["setup"], "give either FLEET.toml, for the configuration of a server, or --user"),
         (["setup", "fleet.toml", "--user", "view"], "give either FLEET.toml"),
+        (["setup", "--user", "view", "--leaf"], "--leaf and --user exclude each other"),
+        (["setup", "fleet.toml", "--out", "keys"], "--out belongs to --user; give --user USER too"),
         (["setup", "--user", "edge"], "an edge needs the path of its axes, such as edge:Graz"),
         (["setup", "--user", "view:Graz"], "choose edge:PATH, fleet, view"),
     ],

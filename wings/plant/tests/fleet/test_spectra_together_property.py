@@ -15,7 +15,8 @@ from hypothesis import strategies as st
 from livebode.configuration import Axis
 from livebode.core import PER_LINE, PER_RESPONSE, Channel, Responses, SpectraLayout
 from livebode.sources.live import SpectraBatch
-from livebode_plant.fleet.axis_stream import AxisStream, Output, outputs_together, stacked_together
+from livebode_plant.fleet.alike_axes import Output, outputs_together, stacked_together
+from livebode_plant.fleet.axis_stream import AxisStream
 from livebode_plant.fleet.fleet_settings import LogSection
 from livebode_plant.fleet.log import FleetLog
 from livebode_plant.fleet.message import message_id, write_message

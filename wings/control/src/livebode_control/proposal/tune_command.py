@@ -1,4 +1,4 @@
-"""`livebode tune`: a controller for the loop of a finished run."""
+"""`livebode tune`: a controller for the loop of a finished run, or an input shaper for its load."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from livebode.cli import Entry, Json, results_directory
+from livebode.cli import Entry, Json, check_use, results_directory
 from livebode.core import RecordError, TuneError, UsageError, write_whole, writing
 from livebode.locations import location
 
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 
 def tune_command(
+    context: typer.Context,
     directory: Annotated[Path, typer.Argument(metavar="RUN", help="Run directory.", parser=location)],
     axis: Annotated[
         Path | None, typer.Option(metavar="AXIS.toml", help="Read \\[loop] from this file instead of the run.")
@@ -61,15 +62,46 @@ def tune_command(
         ),
     ] = None,
     entry: Entry = None,
+    shaper: Annotated[
+        bool, typer.Option("--shaper", help="Propose input shapers for a mode of the fitted model instead.")
+    ] = False,
+    model: Annotated[
+        str | None,
+        typer.Option(
+            help="For --shaper: two-mass, two-mass-gain, three-mass or modal, as in fit. \\[default: the run's [fit]]"
+        ),
+    ] = None,
+    mode: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="For --shaper: antiresonance (the load swings while a stiff drive holds the motor) or resonance; of "
+            "several, with a number: resonance_2; of modal frequency_1, … \\[default: antiresonance; of modal "
+            "frequency_1]",
+        ),
+    ] = None,
+    tolerance: Annotated[float, typer.Option(help="For --shaper: share of the vibration that may remain.")] = 0.05,
+    klipper_axis: Annotated[
+        str, typer.Option(metavar="x|y|z", help="For --shaper: axis in the text for Klipper.")
+    ] = "x",
     as_json: Json = False,
 ) -> None:
-    """Propose gains and filters for the described cascade, safe for every plant within the bounds of the run.
+    """Propose gains and filters for the described cascade, safe for every plant within bounds; or input shapers.
 
     Writes tune.png, the gains as gains.toml, the filters as filters.h and filters.st, and for `livebode report` the
     whole as tune.json, to the run directory; nothing to a machine. The exit code is 2 if no controller meets the
     specification. With --entry of a matrix run it is the controller between that output and input, and the plant that
     it sees while the other [[loop.controllers]] are active as described.
+
+    With --shaper, ZV, ZVD, EI and an optimised shaper are computed over the bounds of a mode at every place of the run.
+    The shortest with enough effect is written as shaper.h and shaper.st, and the best that Klipper has as shaper.cfg.
     """
+    check_use(context, "--shaper", ("--model", "--mode", "--tolerance", "--klipper-axis"))
+    if shaper:
+        from livebode_control.proposal.shaper_output import propose_shaper
+
+        propose_shaper(directory, model, mode, tolerance, klipper_axis, as_json=as_json)
+        return
     if entry is not None and (schedule or strokes is not None):
         raise _not_of_an_entry()
     from livebode.cli import can_draw, tell_how_to_draw

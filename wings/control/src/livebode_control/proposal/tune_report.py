@@ -41,7 +41,7 @@ def tune_run(
     section
         Another description of the loop.
     loop_checked
-        The description was verified otherwise, where no `livebode check-loop` of the run confirms it.
+        The description was verified otherwise, where no `livebode validate --loop` of the run confirms it.
     entry
         Of a matrix run: the controller, "output/input".
 
@@ -110,7 +110,7 @@ def _inputs(directory: Path, section: LoopSection | None, loop_checked: bool) ->
             "loop-unchecked",
             "the run does not name the excitation w (signals.excitation), with which the described controllers are "
             "compared with the recording",
-            "run again with signals.excitation and use livebode check-loop, or compare them otherwise and state it",
+            "run again with signals.excitation and use livebode validate --loop, or state that they were compared",
             argument="loop_checked",
         )
     return by_place(responses), loop, checked

@@ -172,7 +172,7 @@ def tune(
         raise TuneError(
             "loop-unchecked",
             "it was not checked that the described controllers are those of the machine",
-            "compare them with the recording: livebode check-loop",
+            "compare them with the recording: livebode validate --loop",
             argument="loop_checked",
         )
     asked = specification or LoopSpecification()

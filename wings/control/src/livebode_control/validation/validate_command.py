@@ -1,4 +1,4 @@
-"""`livebode validate`: test the fitted model of a run on independent data."""
+"""`livebode validate`: test the fitted model of a run on independent data, or the description of its loop."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from livebode.cli import Entry, Excitation, Json, Output, results_directory
-from livebode.core import LivebodeError, RecordError, writing
+from livebode.cli import Entry, Excitation, Json, Output, check_use, results_directory
+from livebode.core import LivebodeError, RecordError, UsageError, writing
 from livebode.locations import location
 
 if TYPE_CHECKING:
@@ -20,16 +20,24 @@ Channels = dict[str, str | None]
 
 
 def validate_command(
+    context: typer.Context,
     directory: Annotated[Path, typer.Argument(metavar="RUN", help="Run directory.", parser=location)],
     on: Annotated[
-        Path,
+        Path | None,
         typer.Option(
             "--on",
             metavar="LOG|RUN",
             help="A recording that the run does not contain, or another run.",
             parser=location,
         ),
-    ],
+    ] = None,
+    loop: Annotated[
+        bool, typer.Option("--loop", help="Compare the described controllers with the signals of the run instead.")
+    ] = False,
+    axis: Annotated[
+        Path | None,
+        typer.Option(metavar="AXIS.toml", help="For --loop: read \\[loop] from this file instead of the run."),
+    ] = None,
     model: Annotated[
         list[str] | None,
         typer.Option(help="rigid, two-mass, … modal; repeat to compare. \\[default: the run's \\[fit]]"),
@@ -49,13 +57,45 @@ def validate_command(
     entry: Entry = None,
     as_json: Json = False,
 ) -> None:
-    """Simulate the fitted model with another recording and test whether the residual correlates with the signals.
+    """Test the fitted model on another recording, or with --loop the described controllers on the recorded signals.
 
-    Writes validation.png to the run directory. The parameters are constant: the mean over the run, also for a
+    With --on, the model is simulated with the other recording, and the residual is tested for correlation with the
+    signals; writes validation.png to the run directory. The parameters are constant: the mean over the run, also for a
     machine whose plant changes with position. The channels default to those of the run. A model whose simulation is
     not valid, such as of a double integrator that drifts, is judged at the lines: LOG is tracked as the run was. So is
     an entry of a matrix run.
+
+    With --loop, the result is as described, or the change of the description that explains the signals. It needs
+    excitation, input and output in the samples of the run, and writes loop-check.json to the run directory: `livebode
+    margins` and `livebode report` show it. Of a matrix run each of [[loop.controllers]] is compared with its own
+    signals.
     """
+    check_use(context, "--loop", ("--axis",), ("--output", "--input", "--excitation"))
+    channels = {"output": output, "input": input, "excitation": excitation}
+    if loop:
+        from livebode_control.loop_check.loop_check_output import validate_loop
+
+        validate_loop(directory, axis, channels, as_json=as_json)
+    elif on is None:
+        raise _nothing_to_validate()
+    else:
+        _validate_model(directory, on, model or [], radius, lags, samples, channels, at_lines, entry, as_json=as_json)
+
+
+def _nothing_to_validate() -> UsageError:
+    return UsageError(
+        "missing",
+        "there is nothing to validate",
+        "give --on LOG to test the fitted model, or --loop to compare the described controllers with the signals",
+        options=["--on", "--loop"],
+    )
+
+
+def _validate_model(
+    directory: Path, on: Path, models: list[str], radius: float | None, lags: int, samples: int | None,
+    channels: Channels, at_lines: bool, entry: str | None, *, as_json: bool,
+) -> None:  # fmt: skip
+    """Test the models on a recording or another run, write their picture, and print the verdicts."""
     from livebode.cli import tell_how_to_draw
     from livebode.configuration import FitSection, recorded_configuration
     from livebode.records import RunRecord, to_json
@@ -64,9 +104,8 @@ def validate_command(
     base = recorded_configuration(RunRecord.open(directory, entry=entry).summary).get("fit", {}) | (
         {} if radius is None else {"radius_m": radius}
     )
-    named = [{"model": name} for name in model or []] or [{}]
+    named = [{"model": name} for name in models] or [{}]
     sections = [FitSection.model_validate(base | one) for one in named]
-    channels = {"output": output, "input": input, "excitation": excitation}
     reasons = [_reason(section, on, at_lines, entry) for section in sections]
     simulated = [section for section, reason in zip(sections, reasons) if not reason]
     found: list[Validation] = []

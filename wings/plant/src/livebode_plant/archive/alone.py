@@ -19,10 +19,15 @@ from dataclasses import replace
 from pathlib import Path
 
 from livebode.core import ArchiveError, write_whole
-from livebode_plant.archive.job import Job
-from livebode_plant.archive.recording_places import ArchivedRecording
-from livebode_plant.archive.results import HashedContent, RecordingResults, Result, TrackingFailure, failed
-from livebode_plant.archive.tasks import handle_one
+from livebode_plant.archive.archived_recordings import (
+    ArchivedRecording,
+    HashedContent,
+    RecordingResults,
+    Result,
+    TrackingFailure,
+    failed,
+)
+from livebode_plant.archive.tasks import Job, handle_one
 
 _LOOK_S = 0.1
 _KILLED_MAX = 3

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import json
 import logging
 import re
 import time
 import uuid
 from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, TypeVar
 
 from livebode.core import FleetError
@@ -17,7 +19,46 @@ from livebode_plant.fleet import subjects
 from livebode_plant.fleet.connection import connected
 from livebode_plant.fleet.consumer import Consumer
 from livebode_plant.fleet.fleet_settings import LogSection
-from livebode_plant.fleet.partition_count import description_of, partitions_changed, partitions_of
+from livebode_plant.fleet.subjects import LOG_STREAM
+
+_WORD = "partitions"
+
+
+def description_of(count: int) -> str:
+    """The description of the stream.
+
+    >>> partitions_of(description_of(16))
+    16
+    """
+    return f"livebode, {count} {_WORD}"
+
+
+def partitions_of(description: str | None) -> int | None:
+    """The number in a description; None if it has none."""
+    words = (description or "").split()
+    return int(words[-2]) if words[-1:] == [_WORD] and words[-2].isdecimal() else None
+
+
+def partitions_changed(before: int, count: int) -> FleetError:
+    """The error for a number that differs from that of the data in the log."""
+    return FleetError(
+        "partitions-changed",
+        f"the log has data in {before} partitions, and the fleet has partitions = {count}: an axis would continue in "
+        "another partition, without its state and beside its former owner",
+        f"set partitions = {before}, or begin with an empty log",
+        before=before,
+        partitions=count,
+    )
+
+
+def check_store(store: Path, count: int) -> None:
+    """FleetError if the store of a server on this computer has data in another number of partitions."""
+    for about in store.glob(f"jetstream/*/streams/{LOG_STREAM}/meta.inf"):
+        before = partitions_of(json.loads(about.read_text()).get("description"))
+        filled = any(block.stat().st_size for block in about.parent.glob("msgs/*.blk"))
+        if before is not None and before != count and filled:
+            raise partitions_changed(before, count)
+
 
 _logger = logging.getLogger(f"livebode.{__name__}")
 _EXPECTED, _IDENTITY, _WRITE = "Nats-Expected-Last-Subject-Sequence", "Nats-Msg-Id", "Livebode-Write"
@@ -333,6 +374,16 @@ class FleetLog:
         if not self.trouble:
             _logger.warning("the log does not answer (%s); retrying", reason)
         self.trouble = reason
+
+
+def with_log(settings: LogSection, name: str, ask: Callable[[FleetLog], Awaitable[T]]) -> T:
+    """The result of `ask`, which receives a connection of this name; errors as of `FleetLog`."""
+
+    async def connected() -> T:
+        async with FleetLog(settings, name) as log:
+            return await ask(log)
+
+    return asyncio.run(connected())
 
 
 def _stored(raw: Any) -> StoredMessage:

@@ -17,12 +17,13 @@ from dataclasses import dataclass
 from typing import Any
 
 from livebode.configuration import Axis
-from livebode_plant.fleet.axis_stream import AxisStream, stacked_together
+from livebode_plant.fleet.alike_axes import stacked_together
+from livebode_plant.fleet.axis_stream import AxisStream
 from livebode_plant.fleet.log import ClaimLostError, FleetLog, StoredMessage
-from livebode_plant.fleet.page_status import PageStatus
 from livebode_plant.fleet.reader import Reader
 from livebode_plant.fleet.result_message import PendingResults, ResultMessage
 from livebode_plant.fleet.server_config import PAYLOAD_BYTES_MAX
+from livebode_plant.fleet.status_message import PageStatus
 from livebode_plant.fleet.subjects import (
     LOG,
     LOG_STREAM,

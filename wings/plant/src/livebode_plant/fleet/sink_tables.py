@@ -24,13 +24,14 @@ from livebode_plant.fleet.sink_rows import (
     RunKey,
     RunPart,
     SinkRows,
+    dated,
     event_rows,
-    mean_place,
+    run_place,
     run_rows,
     sink_rows,
 )
 from livebode_plant.fleet.subjects import RESULT_STREAM, axis_names
-from livebode_plant.lake import FLEET_SCHEMAS, PARAMETER_MEANS, RESPONSE_MEANS, Lake, StreamTable
+from livebode_plant.lake import TABLES, Lake, StreamTable
 from livebode_plant.lake.wide_responses import from_wide, to_wide
 
 MINUTE_S, HOUR_S = 60, 3600
@@ -144,37 +145,34 @@ class MeanTier:
     def _close(self, through: int, log: str) -> ClosedPeriods:
         own = [key for key in self._responses if key.period <= through]
         fitted = [key for key in self._parameters if key.period <= through]
+        responses, parameters = f"fleet_responses_{self.name}", f"fleet_parameters_{self.name}"
         tables = {
-            f"fleet_responses_{self.name}": self._response_table([(k, self._responses.pop(k)) for k in own], log),
-            f"fleet_parameters_{self.name}": self._parameter_table([(k, self._parameters.pop(k)) for k in fitted], log),
+            responses: self._response_table(responses, [(key, self._responses.pop(key)) for key in own], log),
+            parameters: self._parameter_table(parameters, [(key, self._parameters.pop(key)) for key in fitted], log),
         }
         self.closed = through
         self._begins = {period: number for period, number in self._begins.items() if period > through}
         return ClosedPeriods(through, min(self._begins.values()), tables)
 
-    def _response_table(self, groups: list[tuple[PeriodKey, _Responses]], log: str) -> pa.Table:
-        tables = [RESPONSE_MEANS.empty_table()]
+    def _response_table(self, name: str, groups: list[tuple[PeriodKey, _Responses]], log: str) -> pa.Table:
+        schema = TABLES[name].schema
+        tables = [schema.empty_table()]
         for key, group in groups:
             row = self._place(key, log) | {"responses": group.count}
             wide = to_wide(group.result())
-            columns = [
-                wide[one.name].cast(one.type) if one.name in wide.column_names else pa.array([row[one.name]], one.type)
-                for one in RESPONSE_MEANS
-            ]
-            tables.append(pa.table(columns, schema=RESPONSE_MEANS))
+            columns = [wide[f.name].cast(f.type) if f.name in wide.column_names else pa.array([row[f.name]], f.type)
+                       for f in schema]  # fmt: skip
+            tables.append(pa.table(columns, schema=schema))
         return pa.concat_tables(tables)
 
-    def _parameter_table(self, groups: list[tuple[PeriodKey, FittedQuantities]], log: str) -> pa.Table:
+    def _parameter_table(self, name: str, groups: list[tuple[PeriodKey, FittedQuantities]], log: str) -> pa.Table:
         rows = [
-            {name: value for name, value in vars(quantity.point).items() if name in PARAMETER_MEANS.names}
-            | self._place(key, log)
-            for key, fitted in groups
-            for quantity in fitted.quantities
+            vars(quantity.point) | self._place(key, log) for key, fitted in groups for quantity in fitted.quantities
         ]
-        return pa.Table.from_pylist(rows, PARAMETER_MEANS)
+        return pa.Table.from_pylist(rows, TABLES[name].schema)
 
     def _place(self, key: PeriodKey, log: str) -> dict[str, Any]:
-        return mean_place(key.run, key.period * self._period_s * US, log)
+        return run_place(*key.run, log) | dated("logged_from", key.period * self._period_s)
 
 
 def _invalid(one: Responses) -> Responses:
@@ -246,7 +244,7 @@ class SinkTables:
     def __init__(self, settings: SinkSection) -> None:
         self._settings = settings
         self.lake = Lake(settings.url)
-        self._waiting = {name: _WaitingRows(StreamTable(self.lake, name)) for name in FLEET_SCHEMAS}
+        self._waiting = {name: _WaitingRows(StreamTable(self.lake, name)) for name, one in TABLES.items() if one.days}
         self.totals = SinkTotals()
 
     def resume(self, created_s: float) -> int:

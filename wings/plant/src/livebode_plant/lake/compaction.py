@@ -69,13 +69,13 @@ def _compacted(lake: Lake, name: str) -> CompactionResult | None:
     with lake.reported(name):
         if lake.opened(name) is None:
             return None
-        files = list(lake.snapshot(name).files.values())
+        files = lake.files(name)
         waiting = _open_results(lake, name, files)
         if not waiting:
             for group in small_files(files):
                 lake.join(name, group, joined)
         removed = lake.remove_unused(name, RETENTION_HOURS)
-        return CompactionResult(name, len(files), len(lake.snapshot(name).files), removed, waiting)
+        return CompactionResult(name, len(files), len(lake.files(name)), removed, waiting)
 
 
 def _open_results(lake: Lake, name: str, files: list[DataFile]) -> int:

@@ -1,34 +1,147 @@
-"""FleetBoard: the state of all axes of a fleet as a page shows it. It knows neither the network nor browsers."""
+"""FleetBoard: the state of all axes of a fleet as a page shows it, with its alarms; without network and browsers."""
 
 from __future__ import annotations
 
-import math
+import json
 from collections import OrderedDict
 from collections.abc import Sequence
-from typing import Any
+from dataclasses import asdict, dataclass
+from math import isfinite
+from typing import Any, get_args
 
 import numpy as np
 
 from livebode.core import ServerError
-from livebode.dashboard import Act, AlarmRequest
+from livebode.dashboard import MINUTES_MAX, NAME_MAX, TEXT_MAX, Act, AlarmRequest, AlarmShelf, AlarmState
 from livebode.language import Message
-from livebode_plant.fleet.status_message import BEHIND, NOT_READY, PRIORITIES, SILENT
-from livebode_plant.page import fleet_alarms as alarms
-from livebode_plant.page.fleet_alarms import CONDITIONS, FleetAct, FleetAlarms
+from livebode.monitoring import ALARMS
+from livebode_plant.fleet.status_message import ACTIVE, BEHIND, NOT_READY, PRIORITIES, SILENT
 from livebode_plant.page.fleet_axes import NOWHERE, FleetAxes
+
+CONDITIONS: tuple[AlarmState, ...] = (
+    "normal", "unacknowledged", "returned", "acknowledged", "suppressed", "shelved",
+)  # fmt: skip
+"""The states by their numbers in arrays."""
+NORMAL, UNACKNOWLEDGED, RETURNED, ACKNOWLEDGED, SUPPRESSED, SHELVED = range(len(CONDITIONS))
+ACT_BYTES_MAX = 4096
+_COUNT_MAX = 1 << 32
+Array = np.ndarray[Any, Any]
+
+
+@dataclass(frozen=True)
+class FleetAct:
+    """What a person did with the alarm of an axis: all pages of a fleet get it, and a new one the newest of each axis.
+
+    Attributes
+    ----------
+    act, path
+        What, and the axis.
+    raised, raised_s
+        How often the alarm had been raised, and when last, by the clock of its worker: those are acknowledged.
+    by, words
+        Person, and comment or reason.
+    until_s, at_s
+        End of the shelf, and when the person acted, seconds since 1970.
+    """
+
+    act: Act
+    path: str
+    raised: int
+    raised_s: int
+    by: str = ""
+    words: str = ""
+    until_s: float = 0.0
+    at_s: float = 0.0
+
+    def to_bytes(self) -> bytes:
+        """This act as JSON."""
+        return json.dumps(asdict(self), ensure_ascii=False).encode()
+
+    @classmethod
+    def of(cls, data: bytes) -> FleetAct | None:
+        """The act in these bytes; None if they are none."""
+        try:
+            if len(data) > ACT_BYTES_MAX:
+                return None
+            found = cls(**json.loads(data))
+        except (ValueError, TypeError, RecursionError):
+            return None
+        return found if found._valid() else None
+
+    def _valid(self) -> bool:
+        texts = ((self.path, ACT_BYTES_MAX), (self.by, NAME_MAX), (self.words, TEXT_MAX))
+        times = (self.until_s, self.at_s)
+        return (
+            self.act in get_args(Act)
+            and all(isinstance(text, str) and len(text) <= most and text.isprintable() for text, most in texts)
+            and all(type(n) is int and 0 <= n < _COUNT_MAX for n in (self.raised, self.raised_s))
+            and all(isinstance(t, int | float) and not isinstance(t, bool) and isfinite(t) for t in times)
+            and 0 <= self.until_s <= self.at_s + 60 * MINUTES_MAX + 1
+        )
+
+
+class FleetAlarms:
+    """Acknowledgements and shelves of axes by their rows."""
+
+    def __init__(self) -> None:
+        self.version = 0
+        self._seen = np.zeros(0, np.uint32)
+        self._seen_s = np.zeros(0, np.uint32)
+        self._until_s = np.zeros(0)
+        self._shelves: dict[int, AlarmShelf] = {}
+        self._acknowledged: dict[int, FleetAct] = {}
+
+    def apply(self, act: FleetAct, row: int) -> None:
+        """Take an act on the axis of a row."""
+        self._grow(row + 1)
+        self.version += 1
+        if act.act == "acknowledge":
+            self._seen[row], self._seen_s[row] = act.raised, act.raised_s
+            self._acknowledged[row] = act
+        elif act.act == "shelve":
+            self._until_s[row] = act.until_s
+            self._shelves[row] = AlarmShelf(act.by, act.until_s, act.words)
+        else:
+            self._until_s[row] = 0.0
+            self._shelves.pop(row, None)
+
+    def conditions(self, status: Array, kinds: list[str], now_s: float) -> Array:
+        """Number in `CONDITIONS` of each row, shape (rows,)."""
+        self._grow(len(status))
+        raised, active = status["raised"], (status["flags"] & ACTIVE) > 0
+        of_response = np.array([kind in ALARMS and ALARMS[kind].of_response for kind in kinds])[status["kind"]]
+        # An axis that begins again counts from zero: its next alarm must not pass for an acknowledged one.
+        new = (self._seen[: len(status)] < raised) | ((self._seen_s[: len(status)] < status["raised_s"]) & (raised > 0))
+        found = np.where(new, np.where(active, UNACKNOWLEDGED, RETURNED), np.where(active, ACKNOWLEDGED, NORMAL))
+        found[active & of_response & ((status["flags"] & NOT_READY) > 0)] = SUPPRESSED
+        found[(found != NORMAL) & (self._until_s[: len(status)] > now_s)] = SHELVED
+        return found.astype(np.uint8)
+
+    def plain(self, row: int, now_s: float) -> dict[str, Any]:
+        """Who acknowledged the alarm of a row, and its shelf, for the page."""
+        act, shelf = self._acknowledged.get(row), self._shelves.get(row)
+        found: dict[str, Any] = {"by": act.by, "comment": act.words} if act is not None else {"by": "", "comment": ""}
+        return found | {"shelf": shelf.plain() if shelf is not None and shelf.until_s > now_s else None}
+
+    def _grow(self, rows: int) -> None:
+        if rows > len(self._seen):
+            more = max(1024, rows, 2 * len(self._seen)) - len(self._seen)
+            self._seen = np.concatenate([self._seen, np.zeros(more, np.uint32)])
+            self._seen_s = np.concatenate([self._seen_s, np.zeros(more, np.uint32)])
+            self._until_s = np.concatenate([self._until_s, np.zeros(more)])
+
 
 LOOKS = (
     "open", "ok", "check", "alarm", "returned", "acknowledged", "shelved", "not ready", "silent", "behind", "lost",
 )  # fmt: skip
 """How a tile looks, by its number: 4 bits. Lost: its partition has no worker."""
-OPEN, OK, CHECK, ALARM, RETURNED, ACKNOWLEDGED, SHELVED, NOT_READY_LOOK, SILENT_LOOK, BEHIND_LOOK, LOST = range(11)
+ALARM, RETURNED_LOOK, ACKNOWLEDGED_LOOK, SHELVED_LOOK, NOT_READY_LOOK, SILENT_LOOK, BEHIND_LOOK, LOST = range(3, 11)
 _SEVERITY = np.array([1, 0, 6, 10, 7, 5, 2, 3, 9, 8, 4], float)
 # A worker that is lost would fill the list of the worst axes with all of its axes; it is in the list of workers.
 LOST_S = 5.0
 """A partition whose status is older than this has no worker."""
 WORST, ALARMS_MAX, PARTITIONS_MAX = 50, 300, 100
 _ACTS_MAX = 1 << 18
-Array = np.ndarray[Any, Any]
 
 
 class FleetBoard:
@@ -83,12 +196,12 @@ class FleetBoard:
         looks = status["state"].copy()
         for which, look in (
             ((flags & NOT_READY) > 0, NOT_READY_LOOK),
-            (found == alarms.SHELVED, SHELVED),
-            (found == alarms.ACKNOWLEDGED, ACKNOWLEDGED),
+            (found == SHELVED, SHELVED_LOOK),
+            (found == ACKNOWLEDGED, ACKNOWLEDGED_LOOK),
             ((flags & BEHIND) > 0, BEHIND_LOOK),
             ((flags & SILENT) > 0, SILENT_LOOK),
-            (found == alarms.RETURNED, RETURNED),
-            (found == alarms.UNACKNOWLEDGED, ALARM),
+            (found == RETURNED, RETURNED_LOOK),
+            (found == UNACKNOWLEDGED, ALARM),
         ):
             looks[which] = look
         lost = [n for n, partition in self.axes.partitions.items() if not now_s - partition.heard_s < LOST_S]
@@ -117,7 +230,7 @@ class FleetBoard:
     def open_alarms(self, now_s: float) -> dict[str, Any]:
         """Alarms that are not normal, the most urgent first, at most 300, and how many there are."""
         conditions = self._conditions
-        some = np.flatnonzero(conditions != alarms.NORMAL)
+        some = np.flatnonzero(conditions != NORMAL)
         rank = np.array([9, 0, 1, 2, 3, 4])[conditions[some]]
         status = self.axes.status[some]
         order = np.lexsort((-status["raised_s"].astype(float), -status["priority"].astype(int), rank))
@@ -128,7 +241,7 @@ class FleetBoard:
     def open_count(self) -> int:
         """Number of alarms that are not acknowledged."""
         found = self._conditions
-        return int(np.count_nonzero((found == alarms.UNACKNOWLEDGED) | (found == alarms.RETURNED)))
+        return int(np.count_nonzero((found == UNACKNOWLEDGED) | (found == RETURNED)))
 
     def gaps(self) -> dict[str, Any]:
         """The 50 axes that lost most samples, and the sums of the fleet."""
@@ -227,6 +340,6 @@ def _largest(score: Array, count: int) -> Array:
 
 def _number(value: float) -> float | None:
     """For JSON, with the digits that a person reads."""
-    if not math.isfinite(value):
+    if not isfinite(value):
         return None
     return round(value, 3) if abs(value) > 1e6 else float(f"{value:.6g}")

@@ -12,6 +12,7 @@ from livebode.language import listed, number, tr, trn, worded
 from livebode_plant.report.trend_words import (
     amount,
     change_words,
+    day,
     months,
     outlook,
     quantity_name,
@@ -19,7 +20,6 @@ from livebode_plant.report.trend_words import (
     sentence,
     year_of,
 )
-from livebode_plant.report.year import day
 from livebode_plant.trending import LIMIT_PERCENT, Assessment, History, Ranked, urgency
 
 _SENTENCES, _PICTURES, _ROWS = 12, 6, 40
@@ -196,7 +196,7 @@ class Hall:
             "The first of the changes: each run with its bound, without the influence of the covariates; the trend "
             "with its 95 % bound; jumps and other slopes."
         )
-        return Picture("livebode_plant.report.year:years_figure", {"years": years}, caption) if years else None
+        return Picture("livebode_plant.report.trend_words:years_figure", {"years": years}, caption) if years else None
 
     def _row(self, one: Ranked, history: History) -> tuple[str, ...]:
         trend, unit = one.trend, history.unit_of(one.machine)

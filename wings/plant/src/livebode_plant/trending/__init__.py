@@ -3,17 +3,20 @@
 from livebode.core import Level, needing
 
 with needing("PyArrow", "archive", "a trend"):
-    from livebode_plant.trending.assessment import LIMIT_PERCENT, Assessment, assess
-    from livebode_plant.trending.changes import SIGNIFICANT
-    from livebode_plant.trending.difference import LevelDifference, differences
-    from livebode_plant.trending.fleet import (
+    from livebode_plant.trending.assessment import (
         FALSE_DISCOVERIES,
+        LIMIT_PERCENT,
         LOGARITHMIC,
+        Assessment,
+        LevelDifference,
         Ranked,
+        assess,
+        differences,
         discoveries,
         months_to_limit,
         urgency,
     )
+    from livebode_plant.trending.changes import SIGNIFICANT
     from livebode_plant.trending.quantity_history import History, MachineHistory, Selection, histories, history
     from livebode_plant.trending.trend import MONTH_S, RUNS_MIN, ChangePoint, Effect, NotAssessed, Trend, trend_of
 

@@ -156,18 +156,18 @@ def history(lake: Lake, quantity: str, of: Selection) -> History:
         If there is no such quantity, several have the name, no run has the recipe or a covariate, or the lake cannot
         be read.
     """
-    found = lake.read("quantities", _COLUMNS, where_of(of) & (pc.field("name") == quantity))
+    found = lake.counted("quantities", _COLUMNS, where_of(of) & (pc.field("name") == quantity))
     models = pc.unique(found["model"]).to_pylist()
     model, name = (models[0], quantity) if len(models) == 1 else _resolved(lake, quantity)
     if name != quantity or not models:
         of_it = (pc.field("name") == name) & (pc.field("model") == model)
-        found = lake.read("quantities", _COLUMNS, where_of(of) & of_it)
-    return _history(_counted(lake, found), of, model, name)
+        found = lake.counted("quantities", _COLUMNS, where_of(of) & of_it)
+    return _history(found, of, model, name)
 
 
 def histories(lake: Lake, of: Selection) -> list[History]:
     """All quantities of the runs that count, in the order of models and names."""
-    found = _counted(lake, lake.read("quantities", _COLUMNS, where_of(of)))
+    found = lake.counted("quantities", _COLUMNS, where_of(of))
     own = found if of.recipe is None else recipe_of_each(found, of.recipe)[0]
     return [
         _history(found.filter((pc.field("model") == model) & (pc.field("name") == name)), of, model, name)
@@ -239,15 +239,6 @@ def _path(rows: pa.Table, levels: Sequence[str]) -> pa.Array:
         between = pc.if_else(pc.or_(pc.equal(path, ""), pc.equal(own, "")), "", "/")
         path = pc.binary_join_element_wise(path, between, own, "")
     return pc.if_else(pc.equal(path, ""), UNNAMED, path)
-
-
-def _counted(lake: Lake, rows: pa.Table) -> pa.Table:
-    """Those of results with a row in `runs`."""
-    return rows.filter(pc.is_in(_joined(rows), value_set=_joined(lake.read("runs", _KEY)).combine_chunks()))
-
-
-def _joined(rows: pa.Table) -> pa.ChunkedArray:
-    return pc.binary_join_element_wise(rows["content"], rows["recipe"], "/")
 
 
 def recipe_of_each(rows: pa.Table, recipe: str | None) -> tuple[pa.Table, str, int]:

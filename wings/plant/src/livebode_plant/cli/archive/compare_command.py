@@ -10,8 +10,7 @@ import typer
 
 from livebode.cli import Json, console, is_terminal
 from livebode.core import ArchiveError, UsageError
-from livebode_plant.cli.archive.options import LakeOf
-from livebode_plant.cli.archive.selection import SelectionOptions, with_selection
+from livebode_plant.cli.archive.selection import LakeOf, SelectionOptions, with_selection
 
 if TYPE_CHECKING:
     from livebode_plant.lake import Lake

@@ -12,12 +12,11 @@ import typer
 
 from livebode.cli import Json, console
 from livebode.core import ConfigError, LivebodeError, UsageError, counted
-from livebode_plant.cli.archive.options import LakeOf
-from livebode_plant.cli.archive.selection import SelectionOptions, with_selection
+from livebode_plant.cli.archive.selection import LakeOf, SelectionOptions, with_selection
 
 if TYPE_CHECKING:
     from livebode_plant.archive.archive_settings import ArchiveSettings
-    from livebode_plant.archive.healthy_runs import HealthyRuns
+    from livebode_plant.archive.learning import HealthyRuns
     from livebode_plant.lake import Lake
 
 _REFUSED = 2
@@ -61,7 +60,7 @@ def learn_command(
     from livebode.cli import check_replaceable
     from livebode.records import to_json
     from livebode_plant.archive.archive_settings import lake_url
-    from livebode_plant.archive.healthy_runs import contents_of, healthy_runs
+    from livebode_plant.archive.learning import contents_of, healthy_runs
     from livebode_plant.lake import Lake
 
     settings = _settings(archive)
@@ -114,8 +113,7 @@ def _recipe(settings: ArchiveSettings | None) -> str | None:
 
 def _files(found: Sequence[HealthyRuns], text: str | None, *, each: bool) -> list[Path]:
     """The file of each axis."""
-    from livebode_plant.archive.archive_settings import check_baselines
-    from livebode_plant.archive.template import Template
+    from livebode_plant.archive.archive_settings import Template, check_baselines
 
     if text is None:
         raise UsageError("missing", "the file of the baseline is not named", "give --out FILE", argument="out")

@@ -7,12 +7,13 @@ from typing import Annotated, Any
 import typer
 
 from livebode.cli import Csv, Json, RowsMax, check_query, console, is_terminal, print_result
-from livebode_plant.cli.archive.options import LakeOf
+from livebode_plant.cli.archive.selection import LakeOf
 
 _COLUMNS = ("machine", "runs", "judged", "alarming", "quarantined", "first", "last")
 
 
 def list_command(
+    context: typer.Context,
     archive: LakeOf,
     quarantined: Annotated[
         bool, typer.Option("--quarantined", help="List the recordings in quarantine, with the reason of each.")
@@ -38,8 +39,8 @@ def list_command(
     from livebode_plant.archive.contents import machines, quarantine
     from livebode_plant.lake import Lake
 
+    check_query(context, as_csv=as_csv, as_json=as_json)
     lake = Lake(lake_url(archive))
-    check_query(sql, as_csv=as_csv, as_json=as_json, others={"--quarantined": quarantined})
     if sql is not None:
         from livebode_plant.lake.query import query_lake
 

@@ -1,4 +1,4 @@
-"""Options by which commands select runs of a lake."""
+"""The argument and the options by which the subcommands of `livebode archive` select a lake and its runs."""
 
 from __future__ import annotations
 
@@ -16,6 +16,8 @@ from livebode.core import UsageError
 
 if TYPE_CHECKING:
     from livebode_plant.trending import Selection
+
+LakeOf = Annotated[str, typer.Argument(metavar="ARCHIVE", help="archive.toml, or the directory or URL of its lake.")]
 
 
 class By(StrEnum):

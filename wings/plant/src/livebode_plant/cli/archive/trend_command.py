@@ -1,7 +1,8 @@
-"""`livebode archive trend`: how a quantity changes over months, for each machine of a lake."""
+"""`livebode archive trend`: how quantities change over months, for each machine of a lake."""
 
 from __future__ import annotations
 
+from datetime import UTC, datetime
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -10,11 +11,11 @@ import typer
 
 from livebode.cli import Json, ReportLanguage, console, is_terminal
 from livebode.core import UsageError
-from livebode_plant.cli.archive.options import LakeOf
-from livebode_plant.cli.archive.selection import By, Limit, SelectionOptions, with_selection
+from livebode_plant.cli.archive.selection import By, LakeOf, Limit, SelectionOptions, with_selection
 
 if TYPE_CHECKING:
-    from livebode_plant.trending import Assessment, Ranked
+    from livebode_plant.lake import Lake
+    from livebode_plant.trending import Assessment, Ranked, Selection
 
 _NUMBERS = ("runs",)
 
@@ -56,7 +57,6 @@ def trend_command(
     """
     from livebode.records import to_json
     from livebode_plant.archive.archive_settings import lake_url
-    from livebode_plant.cli.archive.hall_pages import write_hall_pages
     from livebode_plant.lake import Lake
     from livebode_plant.trending import assess, history
 
@@ -190,8 +190,7 @@ def _write(of: Assessment, out: Path, *, dark: bool, force: bool) -> None:
         return
     from livebode.pictures import save as write_picture
     from livebode.pictures import style
-    from livebode_plant.report.trend_words import year_of
-    from livebode_plant.report.year import year_figure
+    from livebode_plant.report.trend_words import year_figure, year_of
 
     if not of.ranked:
         raise UsageError(
@@ -217,6 +216,29 @@ def _write_csv(of: Assessment, path: Path) -> None:
 
 
 def _day(time_s: float) -> str:
-    from livebode_plant.report.year import day
+    from livebode_plant.report.trend_words import day
 
     return day(time_s)
+
+
+def write_hall_pages(
+    lake: Lake, of: Selection, name: str, limit: float, language: str, out: Path, *, force: bool, as_json: bool
+) -> None:
+    """Write HTML and PDF with the trends of all quantities and machines, and print their names."""
+    from livebode.core import document_function
+    from livebode.language import in_language
+    from livebode.records import to_json
+    from livebode_plant.archive.contents import alarms_of, path_of, quarantine
+    from livebode_plant.report.hall_report import Hall
+    from livebode_plant.trending import assess, histories
+
+    bad = [(path_of(row), str(row["sentence"])) for row in quarantine(lake)]
+    title = name or of.below or Path(lake.url).name
+    hall = Hall(title, assess(histories(lake, of), limit), bad, limit, *alarms_of(lake, of))
+    with in_language(language):
+        files, remark = document_function("files")(hall.document(datetime.now(UTC)), out, force=force)
+    if as_json:
+        print(to_json({"files": list(map(str, files))} | hall.plain()))
+        return
+    for line in filter(None, (*files, remark)):
+        print(line)
