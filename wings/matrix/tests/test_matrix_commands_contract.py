@@ -207,7 +207,7 @@ def test_what_cannot_be_exported_is_refused_in_one_sentence(folder: Path, option
         (
             "report {0}/before --on {0}/after.parquet --out {0}/r.html",
             "`livebode validate RUN --entry OUTPUT/INPUT --on RUN`",
-            "validate {0}/before --entry velocity1/u1 --on {0}/after --model rational",
+            "validate {0}/before --entry velocity1/u1 --on {0}/after --model modal",
         ),
     ],
 )

@@ -95,41 +95,41 @@ class Experiment(BaseModel):
         required, above = data.get("excitation", {}), dict(over or {})
         if isinstance(required, dict):
             data["excitation"] = {key: value for key, value in required.items() if key not in _replaced(above)} | above
-        found = cls.of(data, str(path))
-        if found.source is not None:
-            found = found.model_copy(update={"source": found.source.beside(path.parent)})
-        if found.measured is None:
-            return found
-        return found.model_copy(
-            update={"measured": found.measured.model_copy(update={"run": path.parent / found.measured.run})}
+        experiment = cls.of(data, str(path))
+        if experiment.source is not None:
+            experiment = experiment.model_copy(update={"source": experiment.source.beside(path.parent)})
+        if experiment.measured is None:
+            return experiment
+        return experiment.model_copy(
+            update={"measured": experiment.measured.model_copy(update={"run": path.parent / experiment.measured.run})}
         )
 
     @classmethod
     def of(cls, data: Mapping[str, Any], origin: str) -> Experiment:
         """The Experiment in plain data; `origin` names it in messages."""
         try:
-            found = cls.model_validate(data)
+            experiment = cls.model_validate(data)
         except ValidationError as error:
             raise first_of(error, {"": Experiment, "measured": MeasuredSection}).at(origin) from None
-        if found.belt is not None and found.loop is not None:
+        if experiment.belt is not None and experiment.loop is not None:
             raise ConfigError(
                 "key-conflict", "a [belt] axis has its loop in [belt.drive]", "remove [loop]", key="loop"
             ).at(origin)
-        if found.belt is None and found.measured is None:
+        if experiment.belt is None and experiment.measured is None:
             raise ConfigError(
                 "key-missing",
                 "there is neither [belt] nor [measured], so that it describes no machine",
                 "describe a [belt] axis by its constants, or name a run of it in [measured]",
                 key="belt",
             ).at(origin)
-        if found.belt is not None and found.measured is not None:
+        if experiment.belt is not None and experiment.measured is not None:
             raise ConfigError(
                 "key-conflict",
                 "the machine is described twice, by [belt] and by [measured]",
                 "remove one of them",
                 key="belt",
             ).at(origin)
-        return found
+        return experiment
 
     def spec(self) -> ExperimentSpec:
         """Specification from [excitation]."""

@@ -77,12 +77,12 @@ def write_csv(path: Path, waveform: Waveform, name: str) -> None:
 
 def _arrays(waveform: Waveform) -> dict[str, Any]:
     lines = waveform.lines
-    at = list(lines.bins)
+    bins = list(lines.bins)
     return {
         "samples": waveform.samples,
         "frequency_hz": lines.frequency_hz,
         "amplitude": waveform.amplitude,
-        "phase": np.angle(waveform.spectrum[at]) + np.pi / 2,  # of sines, as in eq. (6)
+        "phase": np.angle(waveform.spectrum[bins]) + np.pi / 2,  # of sines, as in eq. (6)
         "rate_hz": lines.rate_hz,
         "facts": json.dumps(facts(waveform)),
     }
@@ -96,8 +96,8 @@ def write_npz(path: Path, waveform: Waveform, name: str) -> None:
 
 def write_mat(path: Path, waveform: Waveform, name: str) -> None:
     """A MATLAB v5 file with one struct of that name; its arrays are columns, `Ts` is the sample time in seconds."""
-    found = _arrays(waveform)
-    columns = {key: value[:, np.newaxis] if np.ndim(value) else value for key, value in found.items()}
+    arrays = _arrays(waveform)
+    columns = {key: value[:, np.newaxis] if np.ndim(value) else value for key, value in arrays.items()}
     write_struct(path, columns | {"Ts": 1 / waveform.lines.rate_hz}, name)
 
 

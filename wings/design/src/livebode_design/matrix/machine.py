@@ -59,7 +59,7 @@ class MatrixMachine(ABC):
     @property
     @abstractmethod
     def rate_hz(self) -> float:
-        """Of the recording."""
+        """Rate of the recording."""
 
     @property
     @abstractmethod
@@ -83,7 +83,7 @@ class MatrixMachine(ABC):
 
     @abstractmethod
     def response(self, frequency_hz: ArrayLike) -> Complex:
-        """Of the plant, shape (lines, outputs, inputs)."""
+        """Response of the plant, shape (lines, outputs, inputs)."""
 
     @abstractmethod
     def deviation(self, frequency_hz: ArrayLike) -> Floats:

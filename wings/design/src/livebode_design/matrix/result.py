@@ -125,6 +125,6 @@ class MatrixDesign:
             "sigma": self.sigma.tolist(),
             "bound_95": self.bound.tolist(),
             "peaks": [asdict(peak) for peak in self.peaks],
-            "alternatives": [asdict(one) for one in self.alternatives],
-            "choices": [asdict(one) for one in self.choices],
+            "alternatives": [asdict(alternative) for alternative in self.alternatives],
+            "choices": [asdict(choice) for choice in self.choices],
         }

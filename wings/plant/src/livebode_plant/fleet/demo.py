@@ -109,8 +109,8 @@ class SimulatedMachines:
         """The batch of an axis with this number."""
         samples = round(BLOCK_S * RATE_HZ)
         first = number * samples
-        at = np.arange(first, first + samples) % self._signals.shape[1]
-        data = self._signals[:, at]
+        places = np.arange(first, first + samples) % self._signals.shape[1]
+        data = self._signals[:, places]
         noise = np.random.default_rng([axis, number]).standard_normal(samples)
         data[2] *= 1 + 0.01 * axis
         data[2] += 1e-3 * noise

@@ -285,8 +285,8 @@ def send_sources(
             for key, source in sources.items():
                 source.stop()
                 edges[key].end()
-    for one in taking:
-        one.result()
+    for thread in taking:
+        thread.result()
     return sum(edge.sent for edge in edges.values())
 
 

@@ -100,8 +100,8 @@ class StoredStates:
         """The axes whose state is to be stored now."""
         now_s = self._clock()
         rested = {key: axis for key, axis in self._axes.items() if axis.rested(now_s)}
-        found = [key for key, axis in rested.items() if STATE_SHARE * axis.since_bytes >= axis.size_bytes]
-        return found + list(self._too_long(rested, set(found)))
+        large = [key for key, axis in rested.items() if STATE_SHARE * axis.since_bytes >= axis.size_bytes]
+        return large + list(self._too_long(rested, set(large)))
 
     def _too_long(self, rested: dict[str, _Axis], found: set[str]) -> Iterator[str]:
         left_s = self.replay_s - sum(rested[key].since_s for key in found)
@@ -244,7 +244,7 @@ class PartitionOwner:
             self._stored.took(key, size, size * a_byte_s)
         if not stored:
             for stack in stacks:
-                self._pending.add_rows([keys[i] for i in stack.at], [streams[i] for i in stack.at], stack)
+                self._pending.add_rows([keys[i] for i in stack.indices], [streams[i] for i in stack.indices], stack)
             for i, output in outputs.items():
                 self._pending.add(keys[i], streams[i], output)
         return messages[taken:]
@@ -269,16 +269,16 @@ class PartitionOwner:
         return sizes, len(messages)
 
     def _stream(self, key: str, number: int) -> AxisStream | None:
-        found = self._streams.get(key)
-        if found is None and key in self._axes:
-            found = self._streams[key] = AxisStream(self._axes[key], number)
-        if found is None:
+        stream = self._streams.get(key)
+        if stream is None and key in self._axes:
+            stream = self._streams[key] = AxisStream(self._axes[key], number)
+        if stream is None:
             if key not in self._unknown:
                 if len(self._unknown) >= _UNKNOWN_MAX:
                     return None
                 _logger.warning("the fleet has no axis %s, whose data arrive", axis_path(key))
             self._unknown[key] = self._unknown.get(key, 0) + 1
-        return found
+        return stream
 
     def _until_due_s(self) -> float:
         """Time until results are due. The partitions of a process take turns, so that they do not wait for another."""

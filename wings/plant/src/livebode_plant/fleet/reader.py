@@ -51,16 +51,16 @@ class Reader:
                 self._consumer = await self._log.consumer(self._stream, self._subject, self.next, _INACTIVE_S)
                 self._delivered = 0
             await self._consumer.ask()
-            found = await self._checked(await self._consumer.answer())
+            messages = await self._checked(await self._consumer.answer())
             if self.pending and self._consumer is not None:
                 await self._consumer.ask()  # the server answers while these are processed
         except (TimeoutError, ConsumerLostError, self._log.errors):
             await self.close()
             await asyncio.sleep(max(timeout_s, _READ_S))
             return []
-        if not found:
+        if not messages:
             await asyncio.sleep(timeout_s)
-        return found
+        return messages
 
     async def close(self) -> None:
         """End reading."""

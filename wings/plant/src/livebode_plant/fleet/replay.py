@@ -182,7 +182,7 @@ class _Again:
             rows = response_table([AxisRows.of(key, stream.run, output.number, output.responses)])
             for _, run, response, digest in _digests(rows):
                 self._expected.setdefault((key, run), {})[response] = digest
-        fits = [AxisFits(key, stream.run, output.fitted, one) for one in output.parameters]
+        fits = [AxisFits(key, stream.run, output.fitted, parameters) for parameters in output.parameters]
         _count(self._parameters, _fitted_digests(parameter_table(fits)))
         _count(self._events, [(key, stream.run, _event_digest(asdict(event))) for event in output.events])
 
@@ -323,7 +323,7 @@ async def replayed(log: FleetLog, key: str, axis: Axis, from_s: float) -> Replay
         output = stream.process(message.data, message.number, message.stored_s)
         if output.responses is not None:
             batches.append(_response_rows(key, stream.run, output.number, output.responses))
-        fits += [AxisFits(key, stream.run, output.fitted, one) for one in output.parameters]
+        fits += [AxisFits(key, stream.run, output.fitted, parameters) for parameters in output.parameters]
     if stream is None:
         raise FleetError(
             "no-data",

@@ -119,7 +119,7 @@ class AlarmSamples:
         subject = f"{LOG}.*.{alarm.axis}"
         first = await self._log.first_since(LOG_STREAM, subject, alarm.logged_s - AROUND_S)
         stop = await self._log.first_since(LOG_STREAM, subject, alarm.logged_s + AROUND_S)
-        return [one async for one in stored_messages(self._log, LOG_STREAM, subject, stop - 1, first)]
+        return [message async for message in stored_messages(self._log, LOG_STREAM, subject, stop - 1, first)]
 
     def _saved(self, alarm: RaisedAlarm, messages: Sequence[StoredMessage]) -> list[dict[str, Any]]:
         """Write a file for each epoch of the sender, and return their rows."""
@@ -142,8 +142,8 @@ class AlarmSamples:
     def _note(self, alarm: RaisedAlarm, rows: Sequence[dict[str, Any]]) -> None:
         own = {"log": self._name, "kind": alarm.kind, "logged": _time(alarm.logged_s)}
         own |= dict(zip(LEVELS, axis_names(alarm.axis)))
-        found = [own | row for row in rows or [{"samples": 0}]]
-        self._lake.add_rows("fleet_samples", pa.Table.from_pylist(found, _SCHEMA))
+        noted = [own | row for row in rows or [{"samples": 0}]]
+        self._lake.add_rows("fleet_samples", pa.Table.from_pylist(noted, _SCHEMA))
 
 
 def _tuples(table: pa.Table) -> Iterator[tuple[Any, ...]]:

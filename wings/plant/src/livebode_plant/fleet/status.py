@@ -51,7 +51,7 @@ async def fleet_status(log: FleetLog, axes: Mapping[str, Axis]) -> dict[str, Any
             found[key] = {"axis": axis_path(key), "partition": about["partition"], **axis}
         silent_s = now_s - about.pop("at_s")
         partitions.append(about | {"silent_s": silent_s, "unknown": [axis_path(key) for key in about["unknown"]]})
-    waiting = sum(one["waiting"] for one in partitions)
+    waiting = sum(partition["waiting"] for partition in partitions)
     full = extent.size_bytes / (log.settings.size_gb * 1e9)
     share = full * waiting / max(1, sum(extent.subjects.values()))
     about_log = {"messages": sum(extent.subjects.values()), "bytes": extent.size_bytes, "full_share": full}
@@ -82,7 +82,7 @@ async def _sinks(log: FleetLog, names: list[str], now_s: float) -> list[dict[str
         return []
     extent = await log.extent(RESULT_STREAM)
     each_bytes = extent.size_bytes / max(1, extent.last - extent.first + 1)
-    found = []
+    sinks = []
     for name in names:
         message = await log.last(STATUS_STREAM, f"{STATUS}.{name}")
         if message is not None:
@@ -91,16 +91,16 @@ async def _sinks(log: FleetLog, names: list[str], now_s: float) -> list[dict[str
             share = min(behind * each_bytes, extent.size_bytes) / (log.settings.results_gb * 1e9)
             stored_s = about.pop("stored_s") or extent.created_s
             behind_s = max(0.0, now_s - stored_s) if behind else 0.0
-            found.append(about | {"behind": behind, "behind_s": behind_s, "results_share": share})
-    return found
+            sinks.append(about | {"behind": behind, "behind_s": behind_s, "results_share": share})
+    return sinks
 
 
 def _sink_alarms(sinks: list[dict[str, Any]]) -> list[str]:
     return [
-        f"the sink of {one['lake']} has not stored {one['results_share']:.0%} of log.results_gb yet: at 100 % results "
-        "are deleted before they are in the lake; start livebode fleet sink, or raise log.results_gb"
-        for one in sinks
-        if one["results_share"] > RESULTS_SHARE_MAX
+        f"the sink of {sink['lake']} has not stored {sink['results_share']:.0%} of log.results_gb yet: at 100 % "
+        "results are deleted before they are in the lake; start livebode fleet sink, or raise log.results_gb"
+        for sink in sinks
+        if sink["results_share"] > RESULTS_SHARE_MAX
     ]
 
 
@@ -110,12 +110,12 @@ def _alarms(partitions: list[dict[str, Any]], axes: list[dict[str, Any]], share:
         alarms.append(
             f"{share:.0%} of the log is not processed yet: at 100 % data are lost; add workers, or raise log.size_gb"
         )
-    for one in partitions:
-        if one["silent_s"] > SILENT_S:
-            alarms.append(
-                f"partition {one['partition']} is silent for {one['silent_s']:.0f} s: check its worker {one['owner']}"
-            )
-        alarms += [f"data of {path} arrive, but the fleet has no such axis: add it to axes" for path in one["unknown"]]
+    for partition in partitions:
+        number, owner, silent_s = (partition[name] for name in ("partition", "owner", "silent_s"))
+        if silent_s > SILENT_S:
+            alarms.append(f"partition {number} is silent for {silent_s:.0f} s: check its worker {owner}")
+        unknown = partition["unknown"]
+        alarms += [f"data of {path} arrive, but the fleet has no such axis: add it to axes" for path in unknown]
     alarms += [f"{axis['axis']} is not tracked: {axis['failure']}" for axis in axes if axis["failure"]]
     alarms += [f"{axis['axis']} lost {axis['lost']} samples" for axis in axes if axis["lost"]]
     return alarms

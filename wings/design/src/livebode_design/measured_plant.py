@@ -81,13 +81,13 @@ class MeasuredResponse(Algebra):
                 band_hz=list(self.band_hz),
             )
         # Over ln f a straight part of the Bode plot is interpolated exactly.
-        at, known = np.log(f), np.log(self.frequency_hz)
+        log_f, known = np.log(f), np.log(self.frequency_hz)
         logarithm = np.log(np.abs(self.value)) + 1j * np.unwrap(np.angle(self.value))
-        return np.asarray(np.exp(np.interp(at, known, logarithm)), dtype=np.complex128)
+        return np.asarray(np.exp(np.interp(log_f, known, logarithm)), dtype=np.complex128)
 
 
 @dataclass(frozen=True)
-class _Integrated(Algebra):
+class _Integral(Algebra):
     """The trapezoidal integral of a sampled output."""
 
     plant: Model
@@ -99,7 +99,7 @@ class _Integrated(Algebra):
 
 
 @dataclass(frozen=True)
-class _Differentiated(Algebra):
+class _Derivative(Algebra):
     plant: Model
 
     def response(self, frequency_hz: ArrayLike) -> Complex:
@@ -174,8 +174,8 @@ def measured_machine(
             argument="radius_m",
             value=radius_m,
         )
-    way = Gain(radius_m) * (_Integrated(given, rate_hz) if output == "velocity" else given)
-    speed = Gain(radius_m) * (given if output == "velocity" else _Differentiated(given))
+    way = Gain(radius_m) * (_Integral(given, rate_hz) if output == "velocity" else given)
+    speed = Gain(radius_m) * (given if output == "velocity" else _Derivative(given))
     own = _motion(motion or {}, stroke_s)
     band_hz = given.band_hz if isinstance(given, MeasuredResponse) else None
     place = OperatingPoint(plant=given, speed=speed, travel=way, angle=way, motion=own, name="as measured")

@@ -47,22 +47,22 @@ class MeasuredMachine(MatrixMachine):
 
     @property
     def rate_hz(self) -> float:
-        """Of the measurement."""
+        """Rate of the measurement."""
         return self.lines.rate_hz
 
     @property
     def inputs(self) -> tuple[str, ...]:
-        """As in the measurement."""
+        """Inputs of the measurement."""
         return self.names[0]
 
     @property
     def excitations(self) -> tuple[str, ...]:
-        """As in the measurement."""
+        """Excitations of the measurement."""
         return self.names[1]
 
     @property
     def outputs(self) -> tuple[tuple[str, str], ...]:
-        """Names and units."""
+        """Names and units of the outputs."""
         return self.output_units
 
     @property
@@ -71,15 +71,15 @@ class MeasuredMachine(MatrixMachine):
         return self.loop
 
     def response(self, frequency_hz: ArrayLike) -> Complex:
-        """At lines of the measurement; UsageError at others."""
+        """Response at lines of the measurement; UsageError at others."""
         return self.value[self._at(frequency_hz)]
 
     def deviation(self, frequency_hz: ArrayLike) -> Floats:
-        """At lines of the measurement; UsageError at others."""
+        """Deviation of the noise at lines of the measurement; UsageError at others."""
         return self.noise_deviation[self._at(frequency_hz)]
 
     def settle_periods(self, excitation: MatrixExcitation, _below: Floats) -> int:
-        """As long as in the measurement."""
+        """Periods until a transient has decayed: as long as in the measurement."""
         return int(np.ceil(self.settle * self.lines.window / excitation.lines.window))
 
     @property

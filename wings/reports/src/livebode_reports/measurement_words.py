@@ -37,11 +37,11 @@ _ROLES = {
 
 def how(of: ReportData) -> Section:
     """The section "How it was measured"."""
-    found, tracking = of.run.found, of.configuration.get("tracking", {})
-    noise = found.get("judged", {}).get("noise", tracking.get("noise", ""))
+    facts, tracking = of.run.found, of.configuration.get("tracking", {})
+    noise = facts.get("judged", {}).get("noise", tracking.get("noise", ""))
     rows = [
         *signal_rows(of),
-        (tr("quantity"), _quantity(found)),
+        (tr("quantity"), _quantity(facts)),
         *grid_rows(of),
         (tr("bounds from"), worded(_NOISE.get(noise, ""))),
         (tr("options"), listed(_options(tracking, of))),
@@ -72,8 +72,8 @@ def signal_rows(of: RunData) -> list[tuple[str, str]]:
 
 def grid_rows(of: RunData) -> list[tuple[str, str]]:
     """Names and values of the lines, the window, the hop and the estimator."""
-    found, f = of.run.found, of.run.lines.frequency_hz
-    window_s = found["window"] / found["rate_hz"]
+    facts, f = of.run.found, of.run.lines.frequency_hz
+    window_s = facts["window"] / facts["rate_hz"]
     return [
         (tr("lines"), trn(
             "{n:,} line, {low:g} … {high:g} Hz on a grid of {step:.4g} Hz",
@@ -82,9 +82,9 @@ def grid_rows(of: RunData) -> list[tuple[str, str]]:
         )),
         (tr("window"), tr(
             "{samples} samples, {ms:.4g} ms: a whole number of periods of each line",
-            samples=found["window"], ms=1000 * window_s,
+            samples=facts["window"], ms=1000 * window_s,
         )),
-        (tr("hop"), _hop(found)),
+        (tr("hop"), _hop(facts)),
         (tr("estimator"), worded(_ESTIMATOR.get(of.configuration.get("tracking", {}).get("estimator", ""), ""))),
     ]  # fmt: skip
 
@@ -161,24 +161,24 @@ def _loop(loop: dict[str, Any]) -> list[str]:
         for name in ("velocity", "position", "position_pd")
         if name in loop
     ]
-    at = worded(str(loop.get("excitation_at")))
-    return [tr("excitation at the {place}", place=at), *parts] if parts else []
+    place = worded(str(loop.get("excitation_at")))
+    return [tr("excitation at the {place}", place=place), *parts] if parts else []
 
 
-def _rate_from(found: dict[str, Any]) -> str:
-    return f" ({worded(found['rate_from'])})" if "rate_from" in found else ""
+def _rate_from(facts: dict[str, Any]) -> str:
+    return f" ({worded(facts['rate_from'])})" if "rate_from" in facts else ""
 
 
-def _quantity(found: dict[str, Any]) -> str:
-    name, unit = worded(found["quantity"]), found["unit"]
+def _quantity(facts: dict[str, Any]) -> str:
+    name, unit = worded(facts["quantity"]), facts["unit"]
     return tr("{quantity}, in {unit}", quantity=name, unit=unit) if unit else tr("{quantity}, no unit", quantity=name)
 
 
-def _hop(found: dict[str, Any]) -> str:
-    if "hop" not in found:
+def _hop(facts: dict[str, Any]) -> str:
+    if "hop" not in facts:
         return ""
-    per_s = found["rate_hz"] / found["hop"]
-    return tr("{samples} samples, {per_s:.4g} responses/s", samples=found["hop"], per_s=per_s)
+    per_s = facts["rate_hz"] / facts["hop"]
+    return tr("{samples} samples, {per_s:.4g} responses/s", samples=facts["hop"], per_s=per_s)
 
 
 _KINDS = {"even": Message("even"), "odd": Message("odd")}

@@ -77,7 +77,7 @@ class DescribedExperiment(Protocol[D]):
 
 
 @dataclass(frozen=True)
-class Designed(Generic[D]):
+class DesignFiles(Generic[D]):
     """Result of a design.
 
     Attributes
@@ -104,7 +104,7 @@ def design_experiment(
     suffixes: Sequence[str] | None = None,
     force: bool = False,
     draw: Callable[[D, Path], object] | None = None,
-) -> Designed[D]:
+) -> DesignFiles[D]:
     """Design the experiment, and write its files to a new directory, which appears when it is complete.
 
     Raises
@@ -144,7 +144,7 @@ def design_experiment(
         facts = {"files": files} | design.plain()
         (partial / _MARK).write_text(to_json(facts, indent=1) + "\n", encoding="utf-8")
         _check_free(directory, force)
-    return Designed(design, directory, files, "\n".join(left_out.values()))
+    return DesignFiles(design, directory, files, "\n".join(left_out.values()))
 
 
 def _without_scipy() -> dict[str, str]:
@@ -157,23 +157,23 @@ def described(experiment: str | PathLike[str] | Mapping[str, Any], over: Mapping
     """The experiment in a TOML file, or in the same as a mapping; `over` replaces keys of its [excitation]."""
     table = experiment if isinstance(experiment, Mapping) else read_table(Path(experiment))
     model: Any = loaded((kind_of_file(table) or named("files")["experiment"]).model)
-    found: DescribedExperiment[Any]
+    specification: DescribedExperiment[Any]
     if not isinstance(experiment, Mapping):
-        found = model.read(Path(experiment), over)
-        return found
+        specification = model.read(Path(experiment), over)
+        return specification
     required = experiment.get("excitation")
     if not isinstance(required, Mapping):
         raise ConfigError("key-missing", "'excitation' is missing", "add it, with the band", key="excitation")
-    found = model.of({**experiment, "excitation": {**required, **over}}, "the description")
-    return found
+    specification = model.of({**experiment, "excitation": {**required, **over}}, "the description")
+    return specification
 
 
 def design_described(
     experiment: str | PathLike[str] | Mapping[str, Any], directory: Path | None, over: Mapping[str, Any]
 ) -> AnyDesign:
     """The design of what is `described`; its files are written to `directory`, in every format; None: nothing is."""
-    found = described(experiment, over)
-    design: AnyDesign = found.design() if directory is None else design_experiment(found, directory).design
+    description = described(experiment, over)
+    design: AnyDesign = description.design() if directory is None else design_experiment(description, directory).design
     return design
 
 
@@ -253,6 +253,6 @@ def _left_by(directory: Path) -> set[str]:
     except (OSError, ValueError, KeyError, TypeError):
         return set()
     excitations = names - {_MARK, _AXIS, _SCHEMA}
-    one = len({Path(name).stem for name in excitations}) == 1
+    single = len({Path(name).stem for name in excitations}) == 1
     plain = all(Path(name).suffix in (*FORMATS, ".png") and Path(name).name == name for name in excitations)
-    return names if one and plain and len(names - excitations) == 3 else set()
+    return names if single and plain and len(names - excitations) == 3 else set()

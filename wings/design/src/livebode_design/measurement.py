@@ -12,15 +12,15 @@ from livebode.core import ConfigError, MeasurementError, write_whole, writing
 from livebode.plugins import loaded, named
 from livebode.sources.live import MeasureSection, Player, SourceSettings, make_source
 from livebode_design.design import Design
-from livebode_design.designing import design_experiment
 from livebode_design.experiment import Experiment
+from livebode_design.experiment_design import design_experiment
 from livebode_design.playback import Playback, StopRequest
 
 LOG = "log.csv"
 
 
 @dataclass(frozen=True)
-class Prepared:
+class ReadyMeasurement:
     """A measurement that could begin now.
 
     Attributes
@@ -97,7 +97,7 @@ class Made:
     lost: int
 
 
-def prepare(experiment: Experiment) -> Prepared:
+def prepare(experiment: Experiment) -> ReadyMeasurement:
     """Design the experiment and check the controller; nothing is played or written.
 
     Raises
@@ -125,7 +125,7 @@ def prepare(experiment: Experiment) -> Prepared:
     if "input" in signals and limits.torque_n_m_max < inf:
         ranges.setdefault(signals["input"], (-limits.torque_n_m_max, limits.torque_n_m_max))
     connection = player.check(design.waveform)
-    return Prepared(design, player, connection, signals["excitation"], ranges, experiment.measure)
+    return ReadyMeasurement(design, player, connection, signals["excitation"], ranges, experiment.measure)
 
 
 def make_player(settings: SourceSettings, section: MeasureSection, excitation: str) -> Player:
@@ -140,7 +140,7 @@ def make_player(settings: SourceSettings, section: MeasureSection, excitation: s
         )
     source = make_source(settings)
     kind = source.address.scheme
-    players = {name: one.player for name, one in named("sources").items() if one.player}
+    players = {name: kind.player for name, kind in named("sources").items() if kind.player}
     if kind not in players:
         raise MeasurementError(
             "not-playable",
@@ -155,7 +155,7 @@ def make_player(settings: SourceSettings, section: MeasureSection, excitation: s
 
 def measure(
     experiment: Experiment,
-    prepared: Prepared,
+    prepared: ReadyMeasurement,
     directory: Path,
     request: StopRequest,
     *,
@@ -172,8 +172,8 @@ def measure(
         If the directory exists, or the disk reports an error.
     """
     design_experiment(experiment.model_copy(update={"log": LOG}), directory, draw=draw)
-    one = prepared.playback(say)
-    measured = one.run(directory / LOG, request)
+    playback = prepared.playback(say)
+    measured = playback.run(directory / LOG, request)
     first, last = measured.steady
     axis = directory / "axis.toml"
     text = axis.read_text(encoding="utf-8")
