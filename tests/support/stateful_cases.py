@@ -191,7 +191,7 @@ def matrix_columns() -> Case:
     inputs, lines = matrices.inputs, len(matrices.lines)
 
     def step(stage: MatrixColumns, part: MatrixResponses) -> object:
-        stage.take(part)
+        stage.add(part)
         return stage.summary(matrices.frequency_hz), stage.valid
 
     return Case(

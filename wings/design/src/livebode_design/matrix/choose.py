@@ -122,8 +122,8 @@ def choose_matrix(spec: MatrixSpec, machine: MatrixMachine, limits: MatrixLimits
     >>> from livebode.simulation import GantryLoop
     >>> machine = MechanismMachine(loop=GantryLoop(), noise=(0.05, 0.05, 0.001))
     >>> spec = MatrixSpec(lines="10:60:10", window=400, kind="orthogonal")
-    >>> found = choose_matrix(spec, machine, MatrixLimits(torque_n_m_max=3.0))
-    >>> found.excitation.kind, found.sigma.shape
+    >>> design = choose_matrix(spec, machine, MatrixLimits(torque_n_m_max=3.0))
+    >>> design.excitation.kind, design.sigma.shape
     ('orthogonal', (6, 3, 2))
     """
     machine.check(limits)
