@@ -46,7 +46,7 @@ def test_a_run_is_tuned_once_its_loop_was_checked(run: Path) -> None:
     assert refused.code == 2
     assert "livebode validate --loop" in refused.err
     assert livebode("validate", run, "--loop").out.startswith("loop checked: as described")
-    done = livebode("tune", run)
+    done = livebode("tune", run, pictures=True)
     assert done.code == 0, done.err
     assert "velocity.gain" in done.out
     assert "is promised" in done.out
@@ -231,7 +231,7 @@ def test_gains_over_the_schedule_are_proposed_from_stops_at_places(tmp_path: Pat
     words = words.replace('output = "y"', 'output = "velocity"\nschedule = "x"')
     (tmp_path / "axis.toml").write_text(words, encoding="utf-8")
     assert livebode("run", tmp_path / "axis.toml", "--out", tmp_path / "run").code == 0
-    done = livebode("tune", tmp_path / "run", "--loop-checked", "--schedule")
+    done = livebode("tune", tmp_path / "run", "--loop-checked", "--schedule", pictures=True)
     assert done.code == 0, done.err
     assert "gains over the schedule" in done.out
     rows = (tmp_path / "run" / "gains.csv").read_text(encoding="utf-8").splitlines()

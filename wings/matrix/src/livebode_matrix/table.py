@@ -11,9 +11,9 @@ ESTIMATES: Mapping[str, Mapping[str, str]] = {
         "fit": "livebode_matrix.run_fit:fit_matrix_run",
         "estimate": "livebode_matrix.response_matrix:ResponseMatrix",
         "recording": "livebode_matrix.response_matrix:examined_matrix",
-        "draw": "livebode_matrix.terminal:drawing_matrix",
+        "draw": "livebode_matrix.terminal:draw_matrix",
         "show": "livebode_matrix.terminal:show_matrix",
-        "page": "livebode.dashboard.matrix_view:views_of_matrix",
+        "page": "livebode.dashboard.run_feed:views_of_matrix",
         "export": "livebode.cli.export_command:matrices",
     }
 }

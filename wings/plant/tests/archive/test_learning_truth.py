@@ -14,8 +14,7 @@ from livebode import ArchiveError
 from livebode.monitoring import Baseline
 from livebode.runtime import Destination, run
 from livebode_plant.archive.archive_settings import ArchiveSettings
-from livebode_plant.archive.healthy_runs import healthy_runs
-from livebode_plant.archive.learning import learn_of_lake
+from livebode_plant.archive.learning import healthy_runs, learn_of_lake
 from livebode_plant.lake import Lake, compact, runs_of
 from livebode_plant.trending import Selection
 from livebode_plant.trending.machine_year import START_S, MachineYear

@@ -46,14 +46,14 @@ def header(recorded: ReportSection, template: Path | None, ask: bool, specified:
     UsageError
         If --ask is used without a terminal.
     """
-    found = recorded
+    header = recorded
     if template is not None:
         from livebode.configuration import read_template
 
         used = read_template(template)
-        found = found.over({name: getattr(used, name) for name in used.model_fields_set})
-    found = found.over(_checked(specified))
-    return found.over(_checked(_answers(found))) if ask else found
+        header = header.over({name: getattr(used, name) for name in used.model_fields_set})
+    header = header.over(_checked(specified))
+    return header.over(_checked(_answers(header))) if ask else header
 
 
 def _checked(specified: dict[str, Any]) -> dict[str, Any]:
@@ -77,7 +77,7 @@ def _checked(specified: dict[str, Any]) -> dict[str, Any]:
     return specified
 
 
-def _answers(found: ReportSection) -> dict[str, str]:
+def _answers(header: ReportSection) -> dict[str, str]:
     if not sys.stdin.isatty():
         raise UsageError(
             "conflict",
@@ -85,7 +85,7 @@ def _answers(found: ReportSection) -> dict[str, str]:
             "use the options --machine, --serial-number and so on, or a --template",
             argument="--ask",
         )
-    missing = {name: words for name, words in _ASKED.items() if not getattr(found, name)}
+    missing = {name: words for name, words in _ASKED.items() if not getattr(header, name)}
     return {
         name: typer.prompt(f"{words} (Enter: none)", default="", show_default=False, err=True)
         for name, words in missing.items()

@@ -12,12 +12,11 @@ import typer
 
 from livebode.cli import Json, console
 from livebode.core import ConfigError, LivebodeError, UsageError, counted
-from livebode_plant.cli.archive.options import LakeOf
-from livebode_plant.cli.archive.selection import SelectionOptions, with_selection
+from livebode_plant.cli.archive.selection import LakeOf, SelectionOptions, with_selection
 
 if TYPE_CHECKING:
     from livebode_plant.archive.archive_settings import ArchiveSettings
-    from livebode_plant.archive.healthy_runs import HealthyRuns
+    from livebode_plant.archive.learning import HealthyRuns
     from livebode_plant.lake import Lake
 
 _REFUSED = 2
@@ -60,19 +59,19 @@ def learn_command(
     from livebode.cli import check_replaceable
     from livebode.records import to_json
     from livebode_plant.archive.archive_settings import lake_url
-    from livebode_plant.archive.healthy_runs import contents_of, healthy_runs
+    from livebode_plant.archive.learning import contents_of, healthy_runs
     from livebode_plant.lake import Lake
 
     settings = _settings(archive)
     lake = Lake(settings.lake if settings else lake_url(archive))
     of = replace(chosen, recipe=_recipe(settings)).selection()
-    found = healthy_runs(lake, of.without(contents_of(lake, exclude or ())))
-    files = _files(found, out or (settings.baselines if settings else None), each=each)
+    axes = healthy_runs(lake, of.without(contents_of(lake, exclude or ())))
+    files = _files(axes, out or (settings.baselines if settings else None), each=each)
     for file in files:
         check_replaceable(file, reason, force=False)
     learned: list[dict[str, Any]] = []
     refused: dict[str, LivebodeError] = {}
-    for one, file in zip(found, files):
+    for one, file in zip(axes, files):
         try:
             learned.append(_learned(lake, one, file, reason, accept=accept))
         except LivebodeError as error:
@@ -111,18 +110,17 @@ def _recipe(settings: ArchiveSettings | None) -> str | None:
     return recipe_id(axes[0]) if len(axes) == 1 else None
 
 
-def _files(found: Sequence[HealthyRuns], text: str | None, *, each: bool) -> list[Path]:
+def _files(axes: Sequence[HealthyRuns], text: str | None, *, each: bool) -> list[Path]:
     """The file of each axis."""
-    from livebode_plant.archive.archive_settings import check_baselines
-    from livebode_plant.archive.template import Template
+    from livebode_plant.archive.archive_settings import Template, check_baselines
 
     if text is None:
         raise UsageError("missing", "the file of the baseline is not named", "give --out FILE", argument="out")
-    if len(found) > 1 and not each:
-        names = ", ".join(one.axis for one in found[:5]) + ", …" * (len(found) > 5)
+    if len(axes) > 1 and not each:
+        names = ", ".join(axis.axis for axis in axes[:5]) + ", …" * (len(axes) > 5)
         raise UsageError(
             "missing",
-            f"{len(found)} axes are selected ({names})",
+            f"{len(axes)} axes are selected ({names})",
             "choose one with --machine, or learn a baseline for each with --each",
             options=["--machine", "--each"],
         )
@@ -130,13 +128,13 @@ def _files(found: Sequence[HealthyRuns], text: str | None, *, each: bool) -> lis
         check_baselines(text, "out")
     except ConfigError as error:
         raise UsageError("unreadable", error.message, error.remedy, argument="out", value=text) from None
-    files = [Template(text).filled(one.levels) for one in found]
-    for one, file in zip(found, files):
+    files = [Template(text).filled(axis.levels) for axis in axes]
+    for axis, file in zip(axes, files):
         if file is None or files.count(file) > 1:
             why = "has a level that is not known" if file is None else "is that of several axes"
             raise UsageError(
                 "unreadable",
-                f"the file of {one.axis}, {text!r}, {why}",
+                f"the file of {axis.axis}, {text!r}, {why}",
                 "name other levels in it: {site}, {line}, {machine}, {axis}",
                 argument="out",
                 value=text,
