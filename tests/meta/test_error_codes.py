@@ -10,7 +10,6 @@ import pytest
 from tests.support.sentences import KINDS, ROOT, made
 from tools.error_codes import page
 
-
 _WHOLE_COMMAND = re.compile(r"livebode [a-z]+( --[a-z-]+)+")  # says in Python, too, what it is
 
 
