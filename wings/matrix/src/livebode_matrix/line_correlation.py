@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Flags, Floats
 from livebode.core import MatrixResponses
-from livebode.mimo import mean_matrix
+from livebode.fitting import mean_matrix
 
 _STEPS_MIN, _STEPS_MAX = 10, 128
 _MARGIN = 2.0  # standard deviations
@@ -95,8 +95,8 @@ class RowSteps:
         """Correlation between lines of errors with the covariance noise ⊗ spread at the lines in `use`.
 
         It is estimated by the sums over pairs and triples of independent steps, which are unbiased, plus two standard
-        deviations: what is underestimated here becomes false alarms far out in the tail. It is the largest where steps are
-        too few.
+        deviations: what is underestimated here becomes false alarms far out in the tail. It is the largest where steps
+        are too few.
         """
         lines = int(np.count_nonzero(use))
         if len(self.step) < _STEPS_MIN or lines < 2:

@@ -136,8 +136,8 @@ def judged(limit: LimitSection, measured: MeasuredValues) -> LimitResult:
     Examples
     --------
     >>> limit = LimitSection(quantity="resonance_hz", min=50.0)
-    >>> one = judged(limit, MeasuredValues.around(np.array([51.0]), np.array([2.0]), "Hz"))
-    >>> one.result, one.times
+    >>> result = judged(limit, MeasuredValues.around(np.array([51.0]), np.array([2.0]), "Hz"))
+    >>> result.result, result.times
     ('undecided', 4.0)
     >>> judged(limit, MeasuredValues.around(np.array([53.0]), np.array([2.0]), "Hz")).result
     'pass'

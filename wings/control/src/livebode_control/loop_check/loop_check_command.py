@@ -46,12 +46,12 @@ def validate_loop(directory: Path, axis: Path | None, channels: dict[str, str | 
             raise _no_channels()
         _check_controllers(directory, section, as_json)
         return
-    found, described = check_loop_of_run(directory, section, channels)
-    written = store_loop_check(results_directory(directory), found, described)
+    check, described = check_loop_of_run(directory, section, channels)
+    written = store_loop_check(results_directory(directory), check, described)
     if as_json:
-        print(to_json(found.plain()))
+        print(to_json(check.plain()))
         return
-    show_loop_check(found)
+    show_loop_check(check)
     print(f"\n{written}")
 
 
@@ -59,14 +59,14 @@ def _check_controllers(directory: Path, section: LoopSection | None, as_json: bo
     from livebode.records import to_json
     from livebode_control.loop_check.run_loop_check import check_controllers_of_run, store_controller_checks
 
-    found, described = check_controllers_of_run(directory, section)
-    written = store_controller_checks(results_directory(directory), found, described)
+    checks, described = check_controllers_of_run(directory, section)
+    written = store_controller_checks(results_directory(directory), checks, described)
     if as_json:
-        print(to_json({"controllers": {name: one.plain() for name, one in found.items()}}))
+        print(to_json({"controllers": {name: check.plain() for name, check in checks.items()}}))
         return
-    for name, one in found.items():
+    for name, check in checks.items():
         print(f"controller {name}:")
-        show_loop_check(one)
+        show_loop_check(check)
         print()
     print(written)
 
@@ -80,14 +80,14 @@ def _no_channels() -> UsageError:
     )
 
 
-def show_loop_check(found: LoopCheck) -> None:
+def show_loop_check(check: LoopCheck) -> None:
     """Print the verdict, the controller at the lines, and the changes that explain it."""
     import numpy as np
 
-    print(found.sentence)
-    residual = found.residual
+    print(check.sentence)
+    residual = check.residual
     ratio, bound = residual.ratio, 1.73 * residual.ratio_sigma
-    print(f"\n  controller as measured / as described, with 95 % bounds ({found.windows} windows)")
+    print(f"\n  controller as measured / as described, with 95 % bounds ({check.windows} windows)")
     print(f"  {'Hz':>8}  {'|ratio|':>9}  {'deg':>8}  {'± %':>8}")
     for f, q, b in zip(residual.frequency_hz, ratio, bound):
         if np.isnan(b):
@@ -95,11 +95,11 @@ def show_loop_check(found: LoopCheck) -> None:
             continue
         mark = "  *" if abs(q - 1) > b else ""
         print(f"  {f:8.4g}  {abs(q):9.5f}  {np.degrees(np.angle(q)):8.3f}  {100 * b:8.2g}{mark}")
-    if len(found.explanations) > 1:
+    if len(check.explanations) > 1:
         print("\n  changes of the description that cannot be told apart with these lines, the best first:")
-        for one in found.explanations[:_LISTED_MAX]:
-            print(f"    {one.sentence}   (p = {one.p:.2g})")
-        if (more := len(found.explanations) - _LISTED_MAX) > 0:
+        for explanation in check.explanations[:_LISTED_MAX]:
+            print(f"    {explanation.sentence}   (p = {explanation.p:.2g})")
+        if (more := len(check.explanations) - _LISTED_MAX) > 0:
             print(f"    and {more} more")
-    if found.nearest is not None:
-        print(f"\n  the nearest single change: {found.nearest.sentence}; more than one word may be wrong")
+    if check.nearest is not None:
+        print(f"\n  the nearest single change: {check.nearest.sentence}; more than one word may be wrong")

@@ -99,28 +99,37 @@ def _validate_model(
 
     base = recorded_configuration(RunRecord.open(directory, entry=entry).summary).get("fit", {})
     named = [{"model": name} for name in models] or [{}]
-    sections = [FitSection.model_validate(base | one) for one in named]
+    sections = [FitSection.model_validate(base | section) for section in named]
     reasons = [_reason(section, on, at_lines, entry) for section in sections]
     simulated = [section for section, reason in zip(sections, reasons) if not reason]
-    found: list[Validation] = []
+    simulated_results: list[Validation] = []
     notes: list[str] = []
     if simulated:
-        found, notes = validate_run(directory, on, simulated, samples=samples, channels=channels)
-    drifting = {v.model: v.why_lines for v in found if v.drifts}
+        simulated_results, notes = validate_run(directory, on, simulated, samples=samples, channels=channels)
+    drifting = {v.model: v.why_lines for v in simulated_results if v.drifts}
     wanted = [(section, reason) for section, reason in zip(sections, reasons) if reason or drifting]
-    at: list[LineValidation] = []
+    line_results: list[LineValidation] = []
     if wanted:
-        at, more = _at_lines(directory, on, wanted, drifting, channels, entry)
+        line_results, more = _at_lines(directory, on, wanted, drifting, channels, entry)
         notes = list(dict.fromkeys([*notes, *more]))
-    found = [v for v in found if v.model not in {one.model for one in at}]  # one verdict for each model
-    picture = _picture(found, directory, on) if found else None
+    simulated_results = [
+        v for v in simulated_results if v.model not in {result.model for result in line_results}
+    ]  # one verdict for each model
+    picture = _picture(simulated_results, directory, on) if simulated_results else None
     if as_json:
-        print(to_json({"models": [v.plain() for v in found] + [one.plain() for one in at], "notes": notes}))
+        print(
+            to_json(
+                {
+                    "models": [v.plain() for v in simulated_results] + [result.plain() for result in line_results],
+                    "notes": notes,
+                }
+            )
+        )
         return
-    for validation in found:
+    for validation in simulated_results:
         show_validation(validation)
-    for one in at:
-        show_line_validation(one)
+    for result in line_results:
+        show_line_validation(result)
     for sentence in notes:
         print(sentence)
     if picture is not None:
@@ -141,7 +150,7 @@ def _reason(section: FitSection, on: Path, at_lines: bool, entry: str | None) ->
     return f"a {section.model} model is not simulated" if section.model in POLE_MODELS else ""
 
 
-def _picture(found: list[Validation], directory: Path, on: Path) -> Path | None:
+def _picture(results: list[Validation], directory: Path, on: Path) -> Path | None:
     from livebode.cli import can_draw
 
     if not can_draw():
@@ -150,7 +159,7 @@ def _picture(found: list[Validation], directory: Path, on: Path) -> Path | None:
 
     into = results_directory(directory)
     with writing(into, RecordError):
-        return save_validation_picture(found, into, title=f"{directory.name} on {on.name}")
+        return save_validation_picture(results, into, title=f"{directory.name} on {on.name}")
 
 
 def _at_lines(
@@ -193,14 +202,14 @@ def _tracked_alike(directory: Path, on: Path, channels: Channels) -> Axis:
     return Axis.of(data | {"source": source | {"log": on}, "signals": signals}, str(directory))
 
 
-def show_validation(found: Validation) -> None:
+def show_validation(validation: Validation) -> None:
     """Print the verdict and the tests behind it."""
-    print(found.sentence)
-    white = "white" if found.whiteness >= 0.03 else "not white"
-    of_it = f"rms {found.residual_sigma:.3g}"
-    print(f"  {found.samples} samples; the residual is {white} (p = {found.whiteness:.2g}), {of_it}")
-    for c in found.correlations:
-        counts = "counts" if c.name in found.judged_by else "does not count"
+    print(validation.sentence)
+    white = "white" if validation.whiteness >= 0.03 else "not white"
+    of_it = f"rms {validation.residual_sigma:.3g}"
+    print(f"  {validation.samples} samples; the residual is {white} (p = {validation.whiteness:.2g}), {of_it}")
+    for c in validation.correlations:
+        counts = "counts" if c.name in validation.judged_by else "does not count"
         lags = "all lags" if c.judged.all() else f"lags {c.lags[c.judged][0]} … {c.lags[-1]}"
         print(
             f"  with {c.name}, {lags}: {100 * c.share:.0f} % inside the limit, {100 * c.white_share:.0f} % inside "
@@ -208,11 +217,11 @@ def show_validation(found: Validation) -> None:
         )
 
 
-def show_line_validation(found: LineValidation) -> None:
+def show_line_validation(validation: LineValidation) -> None:
     """Print the verdict and the numbers behind it."""
-    print(found.sentence)
-    at_hz, sigmas = found.worst
+    print(validation.sentence)
+    at_hz, sigmas = validation.worst
     print(
-        f"  chi² {found.chi2:.3g} per degree of freedom by both uncertainties (p = {found.p:.2g}); worst line "
-        f"{at_hz:g} Hz, {sigmas:.2g} sigma"
+        f"  chi² {validation.chi2:.3g} per degree of freedom by both uncertainties (p = {validation.p:.2g}); "
+        f"worst line {at_hz:g} Hz, {sigmas:.2g} sigma"
     )

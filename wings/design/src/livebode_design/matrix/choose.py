@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from livebode.core import DesignError, Lines, UsageError, counted
-from livebode.mimo import predict
 from livebode_design.matrix.candidate import (
     REPETITIONS_MAX,
     REPETITIONS_MIN,
@@ -123,8 +122,8 @@ def choose_matrix(spec: MatrixSpec, machine: MatrixMachine, limits: MatrixLimits
     >>> from livebode.simulation import GantryLoop
     >>> machine = MechanismMachine(loop=GantryLoop(), noise=(0.05, 0.05, 0.001))
     >>> spec = MatrixSpec(lines="10:60:10", window=400, kind="orthogonal")
-    >>> found = choose_matrix(spec, machine, MatrixLimits(torque_n_m_max=3.0))
-    >>> found.excitation.kind, found.sigma.shape
+    >>> design = choose_matrix(spec, machine, MatrixLimits(torque_n_m_max=3.0))
+    >>> design.excitation.kind, design.sigma.shape
     ('orthogonal', (6, 3, 2))
     """
     machine.check(limits)
@@ -144,7 +143,7 @@ def choose_matrix(spec: MatrixSpec, machine: MatrixMachine, limits: MatrixLimits
     gentle = min(1.0, float(best.ratio.max()) / sqrt(times)) if spec.requires else 1.0
     excitation = best.excitation.scaled(gentle)
     f = lines.frequency_hz
-    unit = predict(excitation, machine.response, 1.0, machine.described).sigma
+    unit = excitation.predict(machine.response, 1.0, machine.described).sigma
     design = MatrixDesign(
         machine=machine,
         limits=limits,

@@ -19,8 +19,8 @@ def properties_of_words(lines: Sequence[str]) -> dict[str, list[str]]:
     Symbols have no blanks and thus show how many channels follow each time column. Where a group has more words than
     channels, its channels go by their symbols, with a number where several have one symbol.
 
-    >>> found = properties_of_words(["Name i Name my pos vel", "SymbolName A.i SymbolName A.p A.v"])
-    >>> found["Name"]
+    >>> properties = properties_of_words(["Name i Name my pos vel", "SymbolName A.i SymbolName A.p A.v"])
+    >>> properties["Name"]
     ['Name', 'i', 'Name', 'A.p', 'A.v']
     """
     rows = {line.split(" ")[0]: line for line in lines if not any(f"Unit{ending}" in line for ending in OTHER)}

@@ -62,7 +62,7 @@ class ArchivedRecording:
 
     @property
     def size_bytes(self) -> int:
-        """Its length."""
+        """Length of the file."""
         return self.place.size_bytes
 
 
@@ -128,7 +128,7 @@ def untracked(
 
 
 def longest_first(recordings: Iterable[ArchivedRecording]) -> list[ArchivedRecording]:
-    """In the order in which they are distributed."""
+    """Recordings in the order in which they are distributed."""
     return sorted(recordings, key=lambda one: (-one.size_bytes, one.content, str(one.place.url)))
 
 

@@ -51,7 +51,7 @@ class HealthyRuns:
 
     @property
     def levels(self) -> dict[str, str | None]:
-        """Its site, line, machine and axis."""
+        """Site, line, machine and axis of the runs."""
         return {level: self.runs[0].row[level] for level in LEVELS}
 
     def check(self) -> None:

@@ -66,7 +66,7 @@ class UsualSpectra(NamedTuple):
         sequencer: Sequencer,
         pipeline: SingleResponse,
     ) -> UsualSpectra | None:
-        """Those that follow this message, if the sequencer returned these Blocks for it; None if it was not usual."""
+        """Spectra that follow this message, if the sequencer returned these Blocks for it; None if it was not usual."""
         tracker, layout = pipeline.follower, sequencer.schema.spectra
         if layout is None or len(blocks) != 1 or len(blocks[0]) != 1 or not sequencer.is_idle:
             return None

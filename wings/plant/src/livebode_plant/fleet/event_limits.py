@@ -37,7 +37,7 @@ class EventLimits(StatefulBase):
         """Each kind's events that may be stored at once, time of the newest event, and how many were dropped."""
 
     def process(self, events: Iterable[Event]) -> list[Event]:
-        """Those of these events that are stored."""
+        """Events of these that are stored."""
         return [stored for event in events for stored in ([event] if event.kind in _FULL else self._limited(event))]
 
     def _limited(self, event: Event) -> list[Event]:

@@ -17,8 +17,8 @@ from typing import Any, TypeVar
 from livebode.core import FleetError
 from livebode_plant.fleet import subjects
 from livebode_plant.fleet.connection import connected
-from livebode_plant.fleet.consumer import Consumer
 from livebode_plant.fleet.fleet_settings import LogSection
+from livebode_plant.fleet.reader import Consumer, StoredMessage
 from livebode_plant.fleet.subjects import LOG_STREAM
 
 _WORD = "partitions"
@@ -87,17 +87,6 @@ class OtherLastError(Exception):
     def __init__(self, last: int, repeated: bool) -> None:
         super().__init__(last)
         self.last, self.repeated = last, repeated
-
-
-@dataclass(frozen=True)
-class StoredMessage:
-    """A message of a stream: its number there, its data, and when the server received it, seconds since 1970."""
-
-    subject: str
-    number: int
-    data: bytes
-    write: str
-    stored_s: float
 
 
 @dataclass(frozen=True)

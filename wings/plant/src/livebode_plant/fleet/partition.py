@@ -19,8 +19,8 @@ from typing import Any
 from livebode.configuration import Axis
 from livebode_plant.fleet.alike_axes import stacked_together
 from livebode_plant.fleet.axis_stream import AxisStream
-from livebode_plant.fleet.log import ClaimLostError, FleetLog, StoredMessage
-from livebode_plant.fleet.reader import Reader
+from livebode_plant.fleet.log import ClaimLostError, FleetLog
+from livebode_plant.fleet.reader import Reader, StoredMessage
 from livebode_plant.fleet.result_message import PendingResults, ResultMessage
 from livebode_plant.fleet.server_config import PAYLOAD_BYTES_MAX
 from livebode_plant.fleet.status_message import PageStatus
@@ -80,7 +80,7 @@ class StoredStates:
         """Computing time that a takeover would repeat now."""
         return sum(axis.since_s for axis in self._axes.values())
 
-    def took(self, key: str, size_bytes: int, computed_s: float) -> None:
+    def processed(self, key: str, size_bytes: int, computed_s: float) -> None:
         """A message of an axis was processed."""
         axis = self._axes.get(key)
         if axis is None:
@@ -236,12 +236,12 @@ class PartitionOwner:
         """Process messages until their results are enough for a message of results; returns the others."""
         stored = bisect_right(messages, self._through, key=lambda message: message.number)
         began_s = time.thread_time()
-        sizes, taken = self._take(messages[:stored] or messages)
+        sizes, taken = self._add_messages(messages[:stored] or messages)
         keys, streams = list(sizes), [self._streams[key] for key in sizes]
         stacks, outputs = stacked_together(streams)
         a_byte_s = (time.thread_time() - began_s) / max(1, sum(sizes.values()))
         for key, size in sizes.items():
-            self._stored.took(key, size, size * a_byte_s)
+            self._stored.processed(key, size, size * a_byte_s)
         if not stored:
             for stack in stacks:
                 self._pending.add_rows([keys[i] for i in stack.indices], [streams[i] for i in stack.indices], stack)
@@ -249,7 +249,7 @@ class PartitionOwner:
                 self._pending.add(keys[i], streams[i], output)
         return messages[taken:]
 
-    def _take(self, messages: Sequence[StoredMessage]) -> tuple[dict[str, int], int]:
+    def _add_messages(self, messages: Sequence[StoredMessage]) -> tuple[dict[str, int], int]:
         """Hand messages to their axes until the results may be enough; returns their bytes by axis, and how many it
         took.
 

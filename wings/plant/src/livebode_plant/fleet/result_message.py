@@ -242,7 +242,7 @@ class PendingResults:
         self._events.append({"axis": key, **event})
 
     def message(self, through: int, owner: str) -> ResultMessage:
-        """All of them as one message."""
+        """One message of all outputs."""
         return ResultMessage(
             through,
             owner,

@@ -24,9 +24,9 @@ from livebode.records import samples_of
 from livebode.sources.live import Batch
 from livebode.tables import from_numpy
 from livebode_plant.fleet.fleet_settings import SinkSection
-from livebode_plant.fleet.log import FleetLog, StoredMessage
+from livebode_plant.fleet.log import FleetLog
 from livebode_plant.fleet.message import read_message
-from livebode_plant.fleet.reader import Reader, stored_messages
+from livebode_plant.fleet.reader import Reader, StoredMessage, stored_messages
 from livebode_plant.fleet.sink_tables import SinkTables, SinkTotals
 from livebode_plant.fleet.subjects import (
     LOG,

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from livebode.core import LEVELS
 from livebode.tables import from_numpy, to_numpy
-from livebode_plant.fleet.log import StoredMessage
+from livebode_plant.fleet.reader import StoredMessage
 from livebode_plant.fleet.result_message import ResultMessage
 from livebode_plant.fleet.subjects import axis_names
 from livebode_plant.lake import TABLES

@@ -17,7 +17,7 @@ from livebode.core import LEVELS, ArchiveError, Responses, SignalError, counted
 from livebode.fitting import RunningMean
 from livebode.tables import Table
 from livebode_plant.fleet.fleet_settings import SinkSection
-from livebode_plant.fleet.log import StoredMessage
+from livebode_plant.fleet.reader import StoredMessage
 from livebode_plant.fleet.sink_rows import (
     DELETED,
     US,
@@ -280,7 +280,9 @@ class SinkTables:
 
     def process(self, messages: list[StoredMessage]) -> list[pa.Table]:
         """Add the next messages, and commit if it is time; returns the events that are new."""
-        events = [rows.tables["fleet_events"] for message in messages if (rows := self._take(message)) is not None]
+        events = [
+            rows.tables["fleet_events"] for message in messages if (rows := self._add_message(message)) is not None
+        ]
         full = sum(waiting.nbytes for waiting in self._waiting.values()) > _WAITING_BYTES_MAX
         if full or time.monotonic() >= self._due_s:
             self._due_s = time.monotonic() + self._settings.commit_s
@@ -289,7 +291,7 @@ class SinkTables:
                 self._clean_while_running()
         return events
 
-    def _take(self, message: StoredMessage) -> SinkRows | None:
+    def _add_message(self, message: StoredMessage) -> SinkRows | None:
         """Add a message; returns its rows if the lake does not have them."""
         if message.number > self._next:
             self._report_deleted(message)

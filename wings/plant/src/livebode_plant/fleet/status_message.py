@@ -130,7 +130,7 @@ class PartitionStatus:
 
     @property
     def axes(self) -> np.ndarray[Any, Any]:
-        """Its axes, `AXIS_STATUS`."""
+        """Axes of the message, `AXIS_STATUS`."""
         return np.frombuffer(self.body, AXIS_STATUS)
 
 

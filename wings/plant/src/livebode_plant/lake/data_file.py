@@ -178,14 +178,6 @@ def _column(rows: pa.Table, field: pa.Field[Any]) -> Any:
     return pa.nulls(rows.num_rows, field.type)
 
 
-def write_data_file(folder: Path, table: str, key: Key, parts: Iterable[pa.Table]) -> DataFile:
-    """Write the rows of one result, without the key's columns, to a file in this directory; none if it has no rows."""
-    with ResultFileWriter(folder, table, key) as writer:
-        for part in parts:
-            writer.write(part)
-        return writer.finish()
-
-
 def parquet_writer(path: Path | pa.BufferOutputStream, schema: pa.Schema) -> pq.ParquetWriter:
     """A Parquet file with the layout of wide responses, without Arrow's own schema: a lake has one for all files."""
     return pq.ParquetWriter(path, schema, store_schema=False, **wide_options(schema))

@@ -339,7 +339,7 @@ def _largest(score: Array, count: int) -> Array:
 
 
 def _number(value: float) -> float | None:
-    """For JSON, with the digits that a person reads."""
+    """A number for JSON, with the digits that a person reads."""
     if not isfinite(value):
         return None
     return round(value, 3) if abs(value) > 1e6 else float(f"{value:.6g}")

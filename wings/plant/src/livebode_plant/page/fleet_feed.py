@@ -225,7 +225,10 @@ def demo_paths(axes: int) -> list[str]:
 
 
 class DemoFleet:
-    """The truth: arrays of one value for each axis, in the order of `paths`.
+    """The truth of a simulated fleet, to try the page without machines: axes that age, fall silent and lose samples.
+
+    Arrays have one value for each axis, in the order of `paths`. Everything follows from the seed and the time since
+    the start, so that a test knows the truth.
 
     Parameters
     ----------

@@ -85,7 +85,7 @@ class Hall:
         return {axis: last for axis, (_, _, last) in self.axes.items() if axis in common}
 
     def plain(self) -> dict[str, Any]:
-        """For JSON."""
+        """Plain data for JSON."""
         return {
             "axes": len(self.axes),
             "runs": sum(runs for runs, _, _ in self.axes.values()),

@@ -29,7 +29,7 @@ class Break:
     time: float
 
     def term(self, time: Floats) -> Floats:
-        """Its column of the regression: one step, or a slope of one, from that time on."""
+        """Column of the change in the regression: one step, or a slope of one, from that time on."""
         after = time >= self.time
         return np.where(after, 1.0 if self.kind == "jump" else time - self.time, 0.0)
 

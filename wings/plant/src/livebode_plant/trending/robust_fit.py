@@ -46,7 +46,7 @@ class CorrelatedScatter:
 
     @classmethod
     def of(cls, q: Floats, error: Floats) -> CorrelatedScatter:
-        """From the errors of rows in the order of time, (rows,), and orthonormal terms, (rows, terms).
+        """Scatter from the errors of rows in the order of time, (rows,), and orthonormal terms, (rows, terms).
 
         An error is a process of first order with white noise, R_ij = a φ^|i−j| + (1 − a) δ_ij. The restricted
         likelihood of each φ and a (Harville, J. Am. Stat. Assoc. 72, 1977), which the terms do not bias, gives its

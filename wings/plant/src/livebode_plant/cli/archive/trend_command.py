@@ -90,7 +90,7 @@ def _check(quantity: str | None, of_one: dict[str, Any], of_all: dict[str, Any])
 
 
 def plain(of: Assessment) -> dict[str, Any]:
-    """For JSON."""
+    """Plain data for JSON."""
     history = of.history
     return {
         "quantity": history.name,

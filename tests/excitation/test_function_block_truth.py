@@ -8,18 +8,17 @@ import numpy as np
 import pytest
 
 from livebode.core import Lines
-from livebode.excitation import multisine as multisine_period
-from livebode.structured_text import multisine
+from livebode.excitation import function_block, multisine
 from tools.structured_text import Instance, Machine
 
 WINDOW, LIMIT = 40, 2.0
-PERIOD = multisine_period(Lines((1, 3, 7), WINDOW, rate_hz=1000.0), 0.5)
+PERIOD = multisine(Lines((1, 3, 7), WINDOW, rate_hz=1000.0), 0.5)
 PEAK = float(np.max(np.abs(PERIOD)))
 
 
 @cache
 def machine(ramp_periods: int) -> Machine:
-    return Machine(multisine(PERIOD, rate_hz=1000, limit=LIMIT, ramp_periods=ramp_periods))
+    return Machine(function_block(PERIOD, rate_hz=1000, limit=LIMIT, ramp_periods=ramp_periods))
 
 
 def fresh(ramp_periods: int = 1, idle_periods: int = 2) -> Instance:

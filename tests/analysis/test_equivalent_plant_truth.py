@@ -8,8 +8,8 @@ import control
 import numpy as np
 import pytest
 
-from livebode.core import Lines, MatrixResponses, Model, as_model
-from livebode.mimo import MatrixLoop, equivalent_plant
+from livebode.analysis import equivalent_plant
+from livebode.core import Lines, MatrixLoop, MatrixResponses, Model, as_model
 from livebode_matrix import example_matrix_responses
 
 LINES = Lines.parse("2:60:2", rate_hz=4000, window=2000)

@@ -6,14 +6,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from livebode.core import UsageError, rounded_down
-from livebode.structured_text.names import check_name
-from livebode.structured_text.text import array, check_rate, comment, real, section
+from livebode.structured_text import SMALLEST, array, check_name, check_rate, comment, real, section
 
-PERIOD_MAX = 16384
+BLOCK_PERIOD_MAX = 16384
 """Longest period, samples: each is a line of text that the PLC's compiler reads."""
-SMALLEST = float(np.finfo(np.float64).tiny)
-"""Magnitude below which an LREAL loses digits, or is zero on some controllers."""
-RAMP_PERIODS_MAX = (2**32 - 1) // PERIOD_MAX
+RAMP_PERIODS_MAX = (2**32 - 1) // BLOCK_PERIOD_MAX
 """Longest ramp: its samples are counted in a UDINT."""
 _LOADED_AT_ONCE = 32  # samples per cycle while the table is filled, so that the first cycle is as short as the others
 
@@ -78,7 +75,7 @@ END_IF
 """
 
 
-def multisine(
+def function_block(
     period: ArrayLike,
     *,
     rate_hz: float,
@@ -119,7 +116,7 @@ def multisine(
 
     Examples
     --------
-    >>> print(multisine([0.0, 1.0, 0.0, -1.0], rate_hz=1000, limit=1.5).splitlines()[0])
+    >>> print(function_block([0.0, 1.0, 0.0, -1.0], rate_hz=1000, limit=1.5).splitlines()[0])
     // 4 samples at 1000 Hz are a period of 0.004 s; peak 1, crest factor 1.414
     """
     check_name(name, "function block")
@@ -173,14 +170,14 @@ def multisine(
 
 def _checked(period: ArrayLike) -> NDArray[np.float64]:
     samples = np.asarray(period, dtype=np.float64)
-    if samples.ndim != 1 or not 2 <= len(samples) <= PERIOD_MAX:
+    if samples.ndim != 1 or not 2 <= len(samples) <= BLOCK_PERIOD_MAX:
         raise UsageError(
             "wrong-shape",
-            f"a period of shape {samples.shape} is not one of 2 to {PERIOD_MAX} samples",
+            f"a period of shape {samples.shape} is not one of 2 to {BLOCK_PERIOD_MAX} samples",
             "give one period, at a lower rate or with lines further apart",
             argument="period",
             shape=list(samples.shape),
-            samples_max=PERIOD_MAX,
+            samples_max=BLOCK_PERIOD_MAX,
         )
     if not np.all(np.isfinite(samples)):
         bad = int(np.flatnonzero(~np.isfinite(samples))[0])

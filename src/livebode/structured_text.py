@@ -1,11 +1,13 @@
-"""Valid names in Structured Text."""
+"""IEC 61131-3 Structured Text: valid names, numbers, comments and declarations."""
 
 from __future__ import annotations
 
 import re
+import sys
 from collections.abc import Iterable, Sequence
+from math import isfinite
 
-from livebode.core import UsageError
+from livebode.core import UsageError, counted
 
 NAME_LENGTH_MAX = 32
 """Length of names that every controller distinguishes."""
@@ -33,6 +35,12 @@ KEYWORDS = frozenset(_KEYWORDS.split())
 
 _NAME = re.compile(r"(?a:_?[A-Za-z][A-Za-z0-9]*(?:_[A-Za-z0-9]+)*)")
 _CONVERSION = re.compile(r"(?:[a-z]+_)?to_[a-z]+")
+SMALLEST = sys.float_info.min
+"""Magnitude below which an LREAL loses digits, or is zero on some controllers."""
+BYTES_MAX = 8 << 20
+"""Most memory of one block or ring: limit of what livebode reads from a PLC, and more than most PLCs have free."""
+Declared = tuple[str, str, str]
+"""A variable, or several with commas between: name, type with its initial value, comment."""
 
 
 def as_name(text: str, taken: Iterable[str] = ()) -> str:
@@ -51,8 +59,8 @@ def as_name(text: str, taken: Iterable[str] = ()) -> str:
     return free
 
 
-def check_name(name: str, what: str) -> None:
-    """Check that `name` is valid in Structured Text; `what` describes in the message whose name it is.
+def check_name(name: str, element: str) -> None:
+    """Check that `name` is valid in Structured Text; `element` describes in the message whose name it is.
 
     Raises
     ------
@@ -64,30 +72,30 @@ def check_name(name: str, what: str) -> None:
         nearest = as_name(name)
         raise UsageError(
             "invalid-name",
-            f"{what} {name!r} {problem} in Structured Text",
+            f"{element} {name!r} {problem} in Structured Text",
             f"take {nearest}",
             value=name,
-            element=what,
+            element=element,
             nearest=nearest,
         )
 
 
-def check_names(names: Sequence[str], what: str, taken: Iterable[str] = ()) -> None:
-    """The same for names in one scope, together with `taken`; case is ignored."""
+def check_names(names: Sequence[str], element: str, taken: Iterable[str] = ()) -> None:
+    """Check names of one scope, together with `taken`: each is valid and none is twice; case is ignored."""
     own = {name.lower() for name in taken}
     before: dict[str, str] = {}
     for name in names:
-        check_name(name, what)
+        check_name(name, element)
         low = name.lower()
         if low in own or low in before:
             other = f"the same as {before[low]!r}" if low in before else "used by the generated text"
             nearest = as_name(name, [*own, *names])
             raise UsageError(
                 "duplicate",
-                f"{what} {name!r} is {other} in Structured Text, which ignores case",
+                f"{element} {name!r} is {other} in Structured Text, which ignores case",
                 f"take {nearest}",
                 value=name,
-                element=what,
+                element=element,
                 nearest=nearest,
             )
         before[low] = name
@@ -109,3 +117,65 @@ def _problem(name: str) -> str | None:
     if len(name) > NAME_LENGTH_MAX:
         return f"has {len(name)} characters, more than {NAME_LENGTH_MAX},"
     return None
+
+
+def real(value: float) -> str:
+    """The number as an LREAL literal, whose digits give the same bits.
+
+    >>> real(0.1), real(1e-17), real(-3)
+    ('0.1', '1.0E-17', '-3.0')
+    """
+    digits, _, exponent = repr(float(value)).partition("e")
+    return (digits if "." in digits else f"{digits}.0") + (f"E{int(exponent)}" if exponent else "")
+
+
+def comment(text: str) -> str:
+    """Comment lines (`//`) in ASCII, because not every programming system accepts other letters; empty for no text."""
+    lines = text.encode("ascii", "replace").decode().splitlines()
+    return "".join(f"// {''.join(c if c.isprintable() else ' ' for c in line)}".rstrip() + "\n" for line in lines)
+
+
+def section(kind: str, declared: Iterable[Declared]) -> str:
+    """Declarations from `VAR_…` to `END_VAR`, aligned."""
+    rows = list(declared)
+    width = min(max(len(name) for name, _, _ in rows), 14)
+    types = max(len(of) for _, of, _ in rows) + 1
+    lines = [f"    {name:<{width}} : {f'{of};':<{types}}  // {comment}".rstrip(" /") for name, of, comment in rows]
+    return "\n".join([kind, *lines, "END_VAR", ""])
+
+
+def array(*lengths: int, of: str = "LREAL") -> str:
+    """The type of an array that counts from 0.
+
+    >>> array(2, 7)
+    'ARRAY [0..1, 0..6] OF LREAL'
+    """
+    return f"ARRAY [{', '.join(f'0..{length - 1}' for length in lengths)}] OF {of}"
+
+
+def check_rate(rate_hz: float) -> None:
+    """UsageError for an invalid rate of a task."""
+    if not (isfinite(rate_hz) and rate_hz > 0):
+        raise UsageError(
+            "out-of-range",
+            f"{rate_hz=} is not above 0",
+            "give the cycles of the task per second",
+            argument="rate_hz",
+            value=rate_hz,
+        )
+
+
+def check_bytes(fixed: int, each: int, count: int, element: str) -> None:
+    """UsageError if `fixed` + `each`·`count` bytes are more than a PLC has; `element` describes the counted object."""
+    needed = fixed + each * count
+    if needed > BYTES_MAX:
+        most = (BYTES_MAX - fixed) // each
+        raise UsageError(
+            "too-large",
+            f"{element} of {counted(count, 'sample')} takes {needed} bytes of the PLC, more than {BYTES_MAX}",
+            f"use at most {counted(most, 'sample')}",
+            samples=count,
+            samples_max=most,
+            size_bytes=needed,
+            limit_bytes=BYTES_MAX,
+        )

@@ -6,8 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from livebode.core import MatrixResponses, Responses
-from livebode.mimo.loop import MatrixLoop
+from livebode.core import MatrixLoop, MatrixResponses, Responses
 
 
 def equivalent_plant(responses: MatrixResponses, loop: MatrixLoop, output: str, input: str) -> Responses:
@@ -43,7 +42,7 @@ def equivalent_plant(responses: MatrixResponses, loop: MatrixLoop, output: str, 
     Examples
     --------
     >>> from livebode import PID
-    >>> from livebode.mimo import MatrixLoop
+    >>> from livebode.core import MatrixLoop
     >>> from livebode_matrix import example_matrix_responses
     >>> velocity = PID(gain=0.3, integral_time_s=0.05, rate_hz=4000)
     >>> loop = MatrixLoop(feedback=[[velocity, None], [None, velocity]])
