@@ -63,9 +63,8 @@ def demo_command(
     columns = (TextColumn("{task.completed:.1f} s"), BarColumn(10), TextColumn("{task.description}"))
     # A first user sees the page without asking for it, on any free port, so that the default port stays free.
     shown = serve or (not fast and find_spec("uvicorn") is not None)
-    with served(
-        shown, ServeSection() if serve else ServeSection(port=0), port, {"demo": ()}, stays=serve
-    ) as subscribers_of:
+    section = ServeSection() if serve else ServeSection(port=0)
+    with served(section, port, {"demo": ()}, stays=serve) if shown else nullcontext(lambda _: ()) as subscribers_of:
         with Progress(*columns, console=console, transient=True, disable=as_json or not console.is_terminal) as bar:
             task = bar.add_task("", total=seconds)
 

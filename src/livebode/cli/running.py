@@ -6,7 +6,7 @@ import gc
 import re
 import signal
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -21,7 +21,6 @@ from livebode.cli.notices import NoticePrinter
 from livebode.cli.picture_support import tell_how_to_draw
 from livebode.cli.pictures import draw, load_beside, tracked_amount
 from livebode.cli.remote import recorded_at
-from livebode.cli.serving import SubscribersOf, print_line, served
 from livebode.configuration import Axes, Axis, ConfigurationFile, ServeSection
 from livebode.core import ConfigError, LocationError, UsageError
 from livebode.estimates import rule
@@ -33,6 +32,7 @@ from livebode.sources import read_head
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from livebode.cli.serving import SubscribersOf
     from livebode.publishing import Publisher
 
 
@@ -82,7 +82,13 @@ def run_targets(
                 "run it without the dashboard",
                 options=["--output-only", "--serve"],
             )
-        with served(serve, _serving(axes), port, entries, stays=not live) as subscribers_of:
+        shown: AbstractContextManager[SubscribersOf] = nullcontext(lambda _: ())
+        section = _serving(axes)
+        if serve:
+            from livebode.cli.serving import served
+
+            shown = served(section, port, entries, stays=not live)
+        with shown as subscribers_of:
             publishing = _published(axes, directory, target.stem, edited=live and file is not None)
             with publishing as publisher:
                 if alone is not None and not live:
@@ -105,6 +111,7 @@ def _published(axes: Axes, directory: Path, alone: str, *, edited: bool) -> Iter
     if not edited and not any(axis.publish for axis in axes.values()):
         yield None
         return
+    from livebode.cli.serving import print_line
     from livebode.publishing import Publisher
 
     with Publisher(axes, directory.with_name(f"{directory.name}.outbox.sqlite"), print_line, alone=alone) as publisher:

@@ -16,7 +16,6 @@ from livebode.configuration.machine_section import MachineSection
 from livebode.configuration.monitoring_section import MonitoringSection
 from livebode.configuration.motion_section import MotionSection
 from livebode.configuration.orders_section import OrdersSection
-from livebode.configuration.output_only import check_output_only
 from livebode.configuration.output_only_section import OutputOnlySection
 from livebode.configuration.publish_section import PublishSection, check_publish
 from livebode.configuration.ready import ReadyCondition, ready_condition
@@ -29,7 +28,8 @@ from livebode.configuration.toml_file import one_line, read_table, shortened
 from livebode.configuration.tracking_section import TrackingSection
 from livebode.core import ConfigError, nearest_name
 from livebode.estimates import MATRIX, RESPONSE, rule
-from livebode.sources.live import SourceSettings, check_keys, checked_address
+from livebode.sources import live
+from livebode.sources.live import SourceSettings
 
 NOT_RECORDED = {"serve", "publish"}
 """Sections that are about this computer and its network, and change no result: run.json has none of them."""
@@ -133,15 +133,17 @@ class Axis(ConfigurationSection):
                 keys=["source.log", keys[0]],
             ).at(origin)
         if axis.source.url is not None:
-            checked_address(axis.source.url, axis.source)
+            live.checked_address(axis.source.url, axis.source)
         if axis.source.replay is not None:
-            check_keys(axis.source, "replay")
+            live.check_keys(axis.source, "replay")
         try:
             if axis.signals.is_matrix:
                 rule(MATRIX, "check")(axis)
             else:
                 _check_no_matrix(axis.experiments, axis.loop, axis.monitoring)
             if axis.output_only is not None:
+                from livebode.configuration.output_only import check_output_only
+
                 check_output_only(axis)
             check_publish(axis.publish)
         except ConfigError as error:

@@ -10,7 +10,6 @@ from livebode import estimation, fitting, preparation
 from livebode.configuration import Axis, with_log
 from livebode.core import Block, Channel, Event, RecordingError
 from livebode.estimation import Follower, Tracker, hum_events, hum_spans
-from livebode.fitting import DriftTest
 from livebode.language import Message
 from livebode.locations import Location, local_copy
 from livebode.preparation import (
@@ -52,7 +51,7 @@ def examined_recordings(axis: Axis, logs: Sequence[Log], to: Destination) -> Exa
     to.prepare()
     of, settings = examined(axis, log, follower), follower.settings
     if settings.quantity == "plant" and settings.periodic and not settings.average:
-        estimate.drift = DriftTest(settings.lines)
+        estimate.drift = fitting.DriftTest(settings.lines)
     return ExaminedRecording(axis, of.source, estimate, of.found, log.clock_kind, dated(log), of.noticed)
 
 

@@ -75,8 +75,8 @@ def test_a_run_draws_its_pictures_and_is_replaced_with_them(folder: Path) -> Non
         found = livebode(*again, pictures=True)
         assert (found.code, found.err) == (0, "")
     assert sorted(path.name for path in (folder / "drawn").iterdir()) == [
-        "bode.png", "covariance.parquet", "events.jsonl", "responses.parquet", "run-copy.json", "run.json",
-        "singular-values.png",
+        "bode.png", "covariance.parquet", "events.jsonl", "manifest.jsonl", "responses.parquet", "run-copy.json",
+        "run.json", "singular-values.png",
     ]  # fmt: skip
 
 

@@ -10,7 +10,7 @@ import { curvesMenu } from "./curves-menu.js";
 import { describe } from "./describe.js";
 import { Events } from "./events.js";
 import { delayMs, marginMarks, modes } from "./fitted.js";
-import { QUANTITIES } from "./frames.js";
+import { framesOf, QUANTITIES } from "./frames.js";
 import { health } from "./health.js";
 import { tr } from "./language.js";
 import { legend } from "./legend.js";
@@ -174,18 +174,23 @@ const link = new Link({
     }
     status();
   },
-  onFrame: (frame) => {
-    if (!page.facts?.begun || frame.axis !== page.axis || frame.quantity !== page.quantity) return;
-    if (frame.kind === "rows") {
-      page.rows.take(frame);
-      page.dirty.add("rows");
-      return;
-    }
-    if (!frame.kind.startsWith("reference") && timeline.atS !== null) return;
-    bode.take(frame);
-    page.dirty.add("bode");
+  onBytes: (data) => {
+    for (const frame of framesOf(data)) takeFrame(frame);
   },
 });
+
+/** @param {import("./messages.js").Frame} frame */
+function takeFrame(frame) {
+  if (!page.facts?.begun || frame.axis !== page.axis || frame.quantity !== page.quantity) return;
+  if (frame.kind === "rows") {
+    page.rows.take(frame);
+    page.dirty.add("rows");
+    return;
+  }
+  if (!frame.kind.startsWith("reference") && timeline.atS !== null) return;
+  bode.take(frame);
+  page.dirty.add("bode");
+}
 
 /**
  * An answer to an earlier request; it would undo the choice of another axis.

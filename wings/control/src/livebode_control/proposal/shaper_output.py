@@ -45,9 +45,9 @@ def propose_shaper(
         raise matrix_unsupported(run.place, "an input shaper")
     modes = modes_by_place(directory, model)
     where = ModeRange.of(modes, mode or ("frequency_1" if modes.model == "modal" else "antiresonance"))
-    found = shapers(where, tolerance)
-    best = chosen(found, tolerance)
-    for_klipper = chosen(tuple(one for one in found if one.kind in KLIPPER_KINDS), tolerance)
+    candidates = shapers(where, tolerance)
+    best = chosen(candidates, tolerance)
+    for_klipper = chosen(tuple(shaper for shaper in candidates if shaper.kind in KLIPPER_KINDS), tolerance)
     rate_hz = run.lines.rate_hz
     into = results_directory(directory)
     with writing(into, RecordError):
@@ -55,29 +55,29 @@ def propose_shaper(
         write_whole(into / "shaper.st", structured_text(best, rate_hz).encode())
         write_whole(into / "shaper.cfg", klipper_text(for_klipper, axis).encode())
     if as_json:
-        print(to_json(_plain(where, found, best)))
+        print(to_json(_plain(where, candidates, best)))
         return
-    show_shapers(where, found, best, tolerance)
+    show_shapers(where, candidates, best, tolerance)
     print(f"\n{into}: shaper.h, shaper.st, shaper.cfg ({for_klipper.kind})")
 
 
-def _plain(where: ModeRange, found: tuple[InputShaper, ...], best: InputShaper) -> dict[str, Any]:
+def _plain(where: ModeRange, candidates: tuple[InputShaper, ...], best: InputShaper) -> dict[str, Any]:
     from dataclasses import asdict
 
-    return {"mode": asdict(where), "chosen": best.kind, "shapers": [asdict(one) for one in found]}
+    return {"mode": asdict(where), "chosen": best.kind, "shapers": [asdict(shaper) for shaper in candidates]}
 
 
-def show_shapers(where: ModeRange, found: tuple[InputShaper, ...], best: InputShaper, tolerance: float) -> None:
+def show_shapers(where: ModeRange, candidates: tuple[InputShaper, ...], best: InputShaper, tolerance: float) -> None:
     """Print the range of the mode, and each shaper with its largest residual vibration."""
     print(
         f"mode from {where.low_hz:.4g} to {where.high_hz:.4g} Hz, damping {where.low_damping:.3g} … "
         f"{where.high_damping:.3g} (95 %, all places)"
     )
     print(f"  {'':10}{'for Hz':>9}{'longer by':>12}{'residual at most':>19}")
-    for one in found:
+    for shaper in candidates:
         print(
-            f"  {one.kind:10}{one.frequency_hz:>9.2f}{1e3 * one.duration_s:>9.1f} ms{100 * one.worst:>17.1f} %"
-            + ("   proposed" if one is best else "")
+            f"  {shaper.kind:10}{shaper.frequency_hz:>9.2f}{1e3 * shaper.duration_s:>9.1f} ms"
+            f"{100 * shaper.worst:>17.1f} %" + ("   proposed" if shaper is best else "")
         )
     if best.worst > tolerance:
         print(

@@ -5,9 +5,10 @@ from __future__ import annotations
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
 from functools import partial
+from operator import attrgetter
 from typing import TYPE_CHECKING
 
 import pyarrow as pa
@@ -35,7 +36,6 @@ from livebode_plant.archive.archived_recordings import (
     untracked,
 )
 from livebode_plant.archive.contents import quarantine
-from livebode_plant.archive.distribution import RecordingGroups
 from livebode_plant.archive.tasks import Job, handle, short
 from livebode_plant.lake import TABLES, DataFile, Lake
 
@@ -195,13 +195,10 @@ class Coordinator:
         self._lake.check()
         places = find_places(self._settings.templates)
         outcome.recordings = len(places)
-        with ExitStack() as stack:
-            try:
-                recordings = self._recordings(places, stack)
-                outcome.known = len(places) - len(recordings) - len(outcome.unreadable)
-                self._handle("tracking", recordings, stack)
-            except (KeyboardInterrupt, SystemExit):
-                outcome.stopped = True
+        with self._until_stopped() as stack:
+            recordings = self._recordings(places, stack)
+            outcome.known = len(places) - len(recordings) - len(outcome.unreadable)
+            self._handle("tracking", recordings, stack)
         return outcome
 
     def retry(self, older: bool) -> ArchiveOutcome:
@@ -211,12 +208,18 @@ class Coordinator:
             rows = [row for row in rows if Version(row["livebode"]) < Version(__version__)]
         self._outcome.recordings = len(rows)
         recordings = [ArchivedRecording(place_of(row), (row["recipe"],), row["content"]) for row in rows]
+        with self._until_stopped() as stack:
+            self._handle("tracking", recordings, stack, alone=True)
+        return self._outcome
+
+    @contextmanager
+    def _until_stopped(self) -> Iterator[ExitStack]:
+        """The context of the cluster; Ctrl-C and SIGTERM end it."""
         with ExitStack() as stack:
             try:
-                self._handle("tracking", recordings, stack, alone=True)
+                yield stack
             except (KeyboardInterrupt, SystemExit):
                 self._outcome.stopped = True
-        return self._outcome
 
     def _recordings(self, places: Sequence[RecordingPlace], stack: ExitStack) -> list[ArchivedRecording]:
         """What is to be tracked, the longest first: contents without a result, and places whose content is not known.
@@ -232,13 +235,13 @@ class Coordinator:
             return untracked(contents, recipes, skipped)
 
         new = [place for place in places if place.known_as not in known]
-        lengths = Counter(place.size_bytes for place in (*new, *(one.place for one in waiting())))
+        lengths = Counter(place.size_bytes for place in (*new, *(recording.place for recording in waiting())))
         alike = [place for place in new if not place.size_bytes or lengths[place.size_bytes] > 1]
         for result in self._handle("reading", [ArchivedRecording(place) for place in alike], stack):
             if isinstance(result, HashedContent):
                 known[result.place.known_as] = result.content
         single = [ArchivedRecording(place, recipes) for place in new if lengths[place.size_bytes] == 1]
-        candidates = {content for one in single for content in by_size.get(one.size_bytes, ())}
+        candidates = {content for recording in single for content in by_size.get(recording.size_bytes, ())}
         done = {content for content in candidates if all((content, recipe) in skipped for recipe in recipes)}
         self._job = replace(self._job, known=frozenset(map(short, done)))
         return longest_first([*waiting(), *single])
@@ -254,15 +257,15 @@ class Coordinator:
         self._outcome.remaining = len(recordings) if tracking else 0
         try:
             for handled in self._distributed(stage, recordings, stack, alone):
-                found = each_result(handled)
-                self._count(found)
+                new = each_result(handled)
+                self._count(new)
                 if tracking:
                     self._outcome.remaining -= len(handled)
                     self._outcome.known += sum(
-                        all(isinstance(x, HashedContent) for x in one.results) for one in handled
+                        all(isinstance(result, HashedContent) for result in recording.results) for recording in handled
                     )
-                results += [] if tracking else found
-                committer.add(found)
+                results += [] if tracking else new
+                committer.add(new)
         finally:
             committer.commit()
         return results
@@ -280,15 +283,15 @@ class Coordinator:
     ) -> Iterator[list[RecordingResults]]:
         """What was found, in the order in which it comes."""
         cluster = self._started(stack)
-        from livebode_plant.archive.distribution import Distribution
+        from livebode_plant.archive.distribution import Distribution, RecordingGroups
 
         groups = RecordingGroups([] if alone else recordings)
-        together, one = partial(handle, self._job), partial(handle_alone, self._job)
+        together, alone_task = partial(handle, self._job), partial(handle_alone, self._job)
         work: Distribution[ArchivedRecording, RecordingResults] = Distribution(
-            cluster, groups, together, one, _again, lost
+            cluster, groups, together, alone_task, attrgetter("again"), lost
         )
         work.last.extend(recordings if alone else ())
-        done, done_bytes, total_bytes = 0, 0, sum(one.size_bytes for one in recordings)
+        done, done_bytes, total_bytes = 0, 0, sum(recording.size_bytes for recording in recordings)
         self._report(Progress(stage, 0, len(recordings), 0, total_bytes, cluster.dashboard))
         try:
             for pairs in work.results():
@@ -308,7 +311,3 @@ class Coordinator:
 
             self._cluster = stack.enter_context(started(self._settings.cluster))
         return self._cluster
-
-
-def _again(handled: RecordingResults) -> bool:
-    return handled.again

@@ -19,8 +19,9 @@ import gzip
 import struct
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal, cast, get_args
 
@@ -222,20 +223,17 @@ class FleetClient(BrowserSocket):
 
     async def _send_lists(self) -> None:
         board, now_s = self._view.board, time.time()
-        name = self._watched.list
-        found: dict[str, Any] = {"trouble": self._view.feed.trouble, "layout": board.layout}
-        found["open"] = board.open_count
-        if name == "worst":
-            found["worst"] = board.worst()
-        elif name == "alarms":
-            found["alarms"] = board.open_alarms(now_s)
-        elif name == "gaps":
-            found["gaps"] = board.gaps()
-        else:
-            found["workers"] = board.workers(now_s)
+        rows: dict[ListName, Callable[[], Any]] = {
+            "worst": board.worst,
+            "alarms": lambda: board.open_alarms(now_s),
+            "gaps": board.gaps,
+            "workers": lambda: board.workers(now_s),
+        }
+        state: dict[str, Any] = {"trouble": self._view.feed.trouble, "layout": board.layout, "open": board.open_count}
+        state[self._watched.list] = rows[self._watched.list]()
         if self._watched.axis is not None:
-            found["axis"] = board.axis(self._watched.axis, now_s)
-        news = {key: value for key, value in found.items() if self._sent.get(key) != value or key == "layout"}
+            state["axis"] = board.axis(self._watched.axis, now_s)
+        news = {key: value for key, value in state.items() if self._sent.get(key) != value or key == "layout"}
         self._sent |= news
         if len(news) > 1:
             await self.send(news)
@@ -276,62 +274,50 @@ class FleetPages:
 
     @property
     def routes(self) -> list[BaseRoute]:
-        """All of them."""
+        """Routes of the page."""
+        answers = {"axes": self.axes, "plan": self.plan, "trend": self.trend}
         return [
             Route("/", self.page),
-            Route("/api/axes", self.axes),
-            Route("/api/plan", self.plan),
-            Route("/api/trend", self.trend),
-            Route("/api/acknowledge", self.acknowledge, methods=["POST"]),
-            Route("/api/shelve", self.shelve, methods=["POST"]),
-            Route("/api/unshelve", self.unshelve, methods=["POST"]),
+            *(Route(f"/api/{name}", partial(self._known, answer)) for name, answer in answers.items()),
+            *(Route(f"/api/{act}", partial(self._act, act), methods=["POST"]) for act in get_args(Act)),
             WebSocketRoute("/live", self.live),
         ]
+
+    async def _known(self, answer: Callable[[Request], Awaitable[Response]], request: Request) -> Response:
+        """The answer to somebody who has logged in."""
+        if self._role(request) is None:
+            return JSONResponse(error_answer(Message("log in first")), 401)
+        return await answer(request)
 
     async def page(self, request: Request) -> Response:
         return RedirectResponse("/login", 303) if self._role(request) is None else self._file("fleet.html")
 
-    async def axes(self, request: Request) -> Response:
+    async def axes(self, _: Request) -> Response:
         """Path of each axis in a line, in order; the layout is in a header."""
-        if self._role(request) is None:
-            return _unknown()
         board = self._view.board
         if self._paths[0] != board.layout:
             self._paths = board.layout, gzip.compress("\n".join(board.paths).encode(), 1)
         headers = {"content-encoding": "gzip", "x-layout": str(board.layout)}
         return Response(self._paths[1], media_type="text/plain; charset=utf-8", headers=headers)
 
-    async def plan(self, request: Request) -> Response:
+    async def plan(self, _: Request) -> Response:
         """The floor plan."""
-        if self._role(request) is None:
-            return _unknown()
         if self._view.plan is None:
             return JSONResponse({"error": "there is no floor plan"}, 404)
         return Response(self._view.plan, media_type="image/svg+xml")
 
     async def trend(self, request: Request) -> Response:
         """A quantity of an axis of this fleet over the last year."""
-        if self._role(request) is None:
-            return _unknown()
         path, axes = request.query_params.get("axis", ""), self._view.board.axes
         if (row := axes.row(path)) is None:
             raise ServerError("request-malformed", "the fleet has no such axis", Message("reload the page"))
         asked = path, request.query_params.get("quantity", ""), axes.names[row].parameter
         return Response(to_json(await self._board.elsewhere(self._trends.plain, *asked)), media_type="application/json")
 
-    async def acknowledge(self, request: Request) -> Response:
-        return await self._act(request, "acknowledge")
-
-    async def shelve(self, request: Request) -> Response:
-        return await self._act(request, "shelve")
-
-    async def unshelve(self, request: Request) -> Response:
-        return await self._act(request, "unshelve")
-
     async def live(self, socket: WebSocket) -> None:
         await serve_browser(self._board, socket, lambda role: FleetClient(self._view, socket, role))
 
-    async def _act(self, request: Request, act: Act) -> Response:
+    async def _act(self, act: Act, request: Request) -> Response:
         data = await self._order(request)
         if isinstance(data, Response):
             return data
@@ -344,7 +330,3 @@ class FleetPages:
     def _role(self, request: Request) -> Role | None:
         headers, address = request.headers, request.client.host if request.client else ""
         return self._board.access.role(headers.get("cookie", ""), headers.get("authorization", ""), address)
-
-
-def _unknown() -> Response:
-    return JSONResponse(error_answer(Message("log in first")), 401)

@@ -1,4 +1,4 @@
-// Types of what the server answers about the loop (loop_trial.py, trial_steps.py).
+// Types of what the server answers about the loop (loop_trials.py, trial_steps.py).
 import type { Words } from "./messages.js";
 
 /** A curve times a parameter to a power; without a name the curve alone. See tuning/feedback_parts.py. */
@@ -27,7 +27,7 @@ export interface LoopBand {
   parts: LoopParts;
 }
 
-/** What a trial of other gains and filters needs; see loop_trial.py. */
+/** What a trial of other gains and filters needs; see loop_trials.py. */
 export interface LoopFacts {
   described: boolean;
   /** of `livebode validate --loop` */

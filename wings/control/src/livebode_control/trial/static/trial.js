@@ -1,6 +1,6 @@
 // @ts-check
 // A trial: other gains and filters for the described loop, and the controller F that they give. Nothing of it is recorded;
-// the server sends the controllers as curves (loop_trial.py), so that F needs no request.
+// the server sends the controllers as curves (loop_trials.py), so that F needs no request.
 import { filter, lowPassOf, notchOf } from "./biquads.js";
 
 /** @import { Biquad, Notch } from "./biquads.js" */
