@@ -152,7 +152,7 @@ main()
     assert "a model is tested by the wing control, which is not installed; install the wing control" in done.stderr
     serve = """
 import sys
-sys.modules["livebode_control"] = None
+sys.modules["livebode_control"] = sys.modules["livebode_matrix"] = None
 from pathlib import Path
 from livebode.dashboard import Dashboard, Serving
 dashboard = Dashboard(Serving("127.0.0.1", 0))
@@ -167,7 +167,7 @@ with dashboard:
         with Tab(browser, server.stdout.readline().strip()) as tab:
             tab.until("bode.drawn.measured")
             assert tab.page.locator("#bode-curves").count() == 1
-            assert tab.page.locator("[id*=what-if]").count() == 0
+            assert tab.page.locator("[id*=what-if], [id*=matrix]").count() == 0
             assert tab.page.request.get(urljoin(tab.page.url, "/api/loop?axis=0")).status == 404
             assert tab.wrong == []
         server.communicate()
