@@ -18,7 +18,7 @@ import time
 import numpy as np
 
 from bench.browser import chromium
-from livebode.dashboard import Dashboard, Serving
+from livebode.dashboard import Dashboard, ServerSettings
 from livebode_plant.fleet.status_message import ACTIVE, AxisName, PartitionNames, encode_names, encode_status
 from livebode_plant.page.fleet_board import FleetAct, FleetBoard
 from livebode_plant.page.fleet_feed import DemoFleet, Hear
@@ -115,7 +115,7 @@ def board_cost(plant: Plant, seconds: int) -> None:
 
 def page_cost(plant: Plant, seconds: float) -> None:
     """Open the page, raise an alarm, scroll."""
-    dashboard = Dashboard(Serving("127.0.0.1", 0))
+    dashboard = Dashboard(ServerSettings("127.0.0.1", 0))
     dashboard.show(FleetView(plant))
     with dashboard, chromium() as browser:
         for words, viewport in (("desktop", (1440, 900)), ("telephone", (390, 844))):

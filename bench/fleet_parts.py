@@ -143,7 +143,7 @@ class MessageCosts:
                 stacks, outputs = stacked_together(streams[part])
                 tracked, pending = time.thread_time(), PendingResults()
                 for stack in stacks:
-                    at = [first + i for i in stack.at]
+                    at = [first + i for i in stack.indices]
                     pending.add_rows([keys[i] for i in at], [streams[i] for i in at], stack)
                 for i, output in outputs.items():
                     pending.add(keys[first + i], streams[first + i], output)

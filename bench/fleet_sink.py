@@ -20,7 +20,7 @@ from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine
 from livebode.simulation import BeltAxis, Sensor, SimulatedAxis, Strokes
 from livebode_plant.fleet.fleet_settings import SinkSection
-from livebode_plant.fleet.log import StoredMessage
+from livebode_plant.fleet.reader import StoredMessage
 from livebode_plant.fleet.result_message import (
     AxisFits,
     AxisRows,

@@ -19,7 +19,7 @@ from livebode.core import Lines, Responses
 from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine
 from livebode.records import RESPONSES, ColumnTable, as_batch
-from livebode.records.table_file import TableFile
+from livebode.records.segments.segment_writer import TableFile
 from livebode.simulation import BeltAxis, Sensor, SimulatedAxis, Strokes
 from livebode.tables import Table
 from livebode_plant.fleet.result_message import AxisRows, ResultMessage, grid_of, response_table

@@ -17,7 +17,7 @@ from playwright.sync_api import Browser, Page, sync_playwright
 
 from examples.screenshots.machines import Afterwards, Tracked, at_standstill, healthy, write_gantry, write_loop
 from livebode.core import Lines
-from livebode.dashboard import Dashboard, Serving
+from livebode.dashboard import Dashboard, ServerSettings
 from livebode.monitoring import Baseline
 from livebode.runtime import ClockSet, Destination, demo, demo_baseline
 from livebode.runtime._demo import RATE_HZ, demo_settings
@@ -113,7 +113,7 @@ class Studio(ExitStack):
                 self.faulty, weeks / f"axis-x-day-{day + 1:02d}", begun=BEGUN + day * DAY_S, factors=factors,
                 alarm=alarm, changes={"monitoring": monitoring},
             )  # fmt: skip
-        dashboard = Dashboard(Serving("127.0.0.1", 0))
+        dashboard = Dashboard(ServerSettings("127.0.0.1", 0))
         dashboard.view_all(weeks)
         return self.enter_context(dashboard).url
 
@@ -123,14 +123,14 @@ class Studio(ExitStack):
 
     def views(self, runs: Sequence[Path]) -> str:
         """A dashboard of finished runs."""
-        dashboard = Dashboard(Serving("127.0.0.1", 0))
+        dashboard = Dashboard(ServerSettings("127.0.0.1", 0))
         for run in runs:
             dashboard.view(run)
         return self.enter_context(dashboard).url
 
     def live(self, axes: dict[str, Afterwards]) -> Dashboard:
         """A dashboard of machines that were healthy for 20 s; it still has to be entered."""
-        dashboard = Dashboard(Serving("127.0.0.1", 0))
+        dashboard = Dashboard(ServerSettings("127.0.0.1", 0))
         for name, afterwards in axes.items():
             hub, held = dashboard.hub(name), healthy(afterwards)
             directory = self.folder / f"{name}-{time.monotonic_ns()}"
@@ -149,7 +149,7 @@ class Studio(ExitStack):
         feed = DemoFeed(fleet, silent=[3], began_s=time.time() - 150)
         status = fleet.status(150.0, time.time())
         write_year(lake, AXIS, float(status["value"][fleet.paths.index(AXIS)]))
-        dashboard = Dashboard(Serving("127.0.0.1", 0))
+        dashboard = Dashboard(ServerSettings("127.0.0.1", 0))
         dashboard.show(FleetView(feed, floor_plan(_PLAN), lake=str(lake)))
         return self.enter_context(dashboard).url
 

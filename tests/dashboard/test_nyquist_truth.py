@@ -11,7 +11,7 @@ import pytest
 from playwright.sync_api import Browser
 
 from livebode.configuration import LoopSection
-from livebode.dashboard import Dashboard, Serving
+from livebode.dashboard import Dashboard, ServerSettings
 from livebode.records import RunRecord
 from tests.support.browser import Tab
 from tests.support.dashboards import LINES, LOOP, RATE_HZ, Watched
@@ -31,7 +31,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def tab(browser: Browser, run: Path) -> Iterator[Tab]:
-    dashboard = Dashboard(Serving("127.0.0.1", 0))
+    dashboard = Dashboard(ServerSettings("127.0.0.1", 0))
     dashboard.view(run)
     with dashboard, Tab(browser, dashboard.url + "#quantity=open+loop") as found:
         found.until("bode.drawn.model && bode.known.margins().length")

@@ -33,7 +33,7 @@ WRITING_MODULES = {
     ),
     _NEW: (
         "interface/example_recordings", "livebode_design/experiment_design",
-        "livebode_plant/fleet/connection", "records/run_directory", "records/table_file",
+        "livebode_plant/fleet/connection", "records/run_directory", "records/segments/segment_writer",
     ),
     _TEMPORARY: ("livebode_plant/archive/alone", "livebode_plant/fleet/server", "livebode_plant/fleet/demo"),
     "the null device": ("cli/app", "livebode_plant/archive/clusters"),

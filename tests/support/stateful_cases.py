@@ -21,9 +21,8 @@ from livebode.estimation import (
     Tracker,
     UnevenTracker,
 )
-from livebode.excitation import multisine
+from livebode.excitation import MatrixExcitation, multisine
 from livebode.fitting import DriftTest, EvaluationGrid, Fitter, TwoMass
-from livebode.mimo import MatrixExcitation
 from livebode.monitoring import (
     Baseline,
     Monitor,

@@ -14,7 +14,7 @@ import numpy as np
 from blark import transform as tf
 from blark.parse import parse_source_code
 
-from livebode.structured_text.names import KEYWORDS
+from livebode.structured_text import KEYWORDS
 from tools.stored import stored
 from tools.structured_text.expressions import RUNTIME, Scope, assignable
 from tools.structured_text.statements import Body

@@ -83,5 +83,5 @@ def model_test(directory: Path, on: Path) -> ModelTest:
             "install the wing control of livebode",
             argument="on",
         )
-    found: ModelTest = test(directory, on)
-    return found
+    result: ModelTest = test(directory, on)
+    return result

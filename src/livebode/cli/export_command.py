@@ -129,7 +129,7 @@ def responses(record: RunRecord, at: float | None, mean: bool) -> Iterator[Respo
     from livebode.core import Responses
 
     if at is not None:
-        return iter([Responses.of(export.at(record.batches(), at))])
+        return iter([Responses.of(export.nearest_response(record.batches(), at))])
     if mean:
         from livebode.analysis import mean_of
 

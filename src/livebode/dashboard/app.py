@@ -19,17 +19,16 @@ from livebode import export
 from livebode.core import LivebodeError, Responses, ServerError, remove_created
 from livebode.dashboard import queries
 from livebode.dashboard.access import COOKIE, SESSION_S, error_answer
-from livebode.dashboard.admission import serve_browser
 from livebode.dashboard.alarm_requests import Act, alarm_request
 from livebode.dashboard.board import Board
-from livebode.dashboard.client import Client
+from livebode.dashboard.browser_socket import Client, serve_browser
 from livebode.dashboard.frames import frame
 from livebode.dashboard.guard import Guard, body
 from livebode.dashboard.past import Past
 from livebode.dashboard.plugin_pages import Answer, PluginPages, ShownRun, files_of_additions, page_additions
 from livebode.dashboard.queries import SavedChange
 from livebode.dashboard.runs_pages import RunsPages
-from livebode.dashboard.server_settings import Serving
+from livebode.dashboard.server_settings import ServerSettings
 from livebode.dashboard.signals import signals
 from livebode.dashboard.state import State
 from livebode.language import Message, catalogue_for_page, negotiated
@@ -40,22 +39,22 @@ from livebode.records import SavedCurves, change_saved, read_saved
 def listed(saved: SavedCurves) -> dict[str, Any]:
     """Names and times for the page; the curves themselves are sent as frames."""
     references = [
-        {"id": one.id, "name": one.name, "saved": one.saved, "time_s": float(one.response.time_s[0])}
-        for one in saved.references
+        {"id": item.id, "name": item.name, "saved": item.saved, "time_s": float(item.response.time_s[0])}
+        for item in saved.references
     ]
-    return {"references": references, "annotations": [vars(one) for one in saved.annotations]}
+    return {"references": references, "annotations": [vars(item) for item in saved.annotations]}
 
 
 def applied(change: SavedChange, past: Past, state: State) -> Callable[[SavedCurves], SavedCurves]:
     """The change as a function; it reads the record, so it is called in another thread."""
     if change.kind == "annotation":
-        return lambda saved: saved.with_annotation(change.text, change.at)
+        return lambda saved: saved.with_annotation(change.text, change.value)
     if change.kind == "remove":
         return lambda saved: saved.without(change.text)
     quantities = state.quantities
 
     def add(saved: SavedCurves) -> SavedCurves:
-        response = past.at(change.at)
+        response = past.at(change.value)
         if quantities is None or not quantities.fit(response):
             raise ServerError("not-begun", "the response belongs to a previous run", "choose one of this run")
         return saved.with_reference(change.text, response)
@@ -69,7 +68,7 @@ _TYPES = {"csv": "text/csv; charset=utf-8", "mat": "application/octet-stream"}
 
 
 def application(
-    board: Board, serving: Serving, directory: Path | None = None, others: PluginPages | None = None
+    board: Board, serving: ServerSettings, directory: Path | None = None, others: PluginPages | None = None
 ) -> Guard:
     """The ASGI application: the page of the board, of a plug-in, or of all runs of a directory, each with a board."""
     pages = _Pages(board, serving, _files(others))
@@ -88,7 +87,7 @@ def application(
         routes += RunsPages(
             directory,
             board,
-            lambda one: _app(_page_routes(_Pages(one, serving, pages.files))),
+            lambda board: _app(_page_routes(_Pages(board, serving, pages.files))),
             pages.file,
             serving.language,
         ).routes
@@ -120,7 +119,7 @@ def _page_routes(pages: _Pages) -> list[BaseRoute]:
 class _Pages:
     """The handlers of the routes."""
 
-    def __init__(self, board: Board, serving: Serving, files: dict[str, tuple[bytes, str]]) -> None:
+    def __init__(self, board: Board, serving: ServerSettings, files: dict[str, tuple[bytes, str]]) -> None:
         self._board, self._secure, self._language = board, serving.tls is not None, serving.language
         self.files = files
 
@@ -166,16 +165,16 @@ class _Pages:
         if (state := self._asked_state(request)) is None:
             return _unknown()
         span, past = queries.span(request.query_params, len(self._board.states)), Past.of(state)
-        found = await self._board.elsewhere(past.between, span.from_s, span.to_s, span.rows)
-        return Response(frame("history", span.axis, _as(state, found, span)), media_type="application/octet-stream")
+        rows = await self._board.elsewhere(past.between, span.from_s, span.to_s, span.rows)
+        return Response(frame("history", span.axis, _as(state, rows, span)), media_type="application/octet-stream")
 
     async def moment(self, request: Request) -> Response:
         """The response nearest to a time, with its overlays."""
         if (state := self._asked_state(request)) is None:
             return _unknown()
         span = queries.span(request.query_params, len(self._board.states))
-        found = await self._board.elsewhere(Past.of(state).at, span.from_s)
-        data = state.frames_of("moment", found, span.quantity)
+        response = await self._board.elsewhere(Past.of(state).at, span.from_s)
+        data = state.frames_of("moment", response, span.quantity)
         return Response(data, media_type="application/octet-stream")
 
     async def signals(self, request: Request) -> Response:
@@ -183,8 +182,8 @@ class _Pages:
         if self._role(request) is None:
             return _unknown()
         asked = queries.signals_asked(request.query_params, len(self._board.states))
-        found = await signals(self._board, self._begun(asked.axis), asked)
-        return Response(found, media_type="application/octet-stream")
+        answer = await signals(self._board, self._begun(asked.axis), asked)
+        return Response(answer, media_type="application/octet-stream")
 
     def routes_of_additions(self) -> list[BaseRoute]:
         """The requests that the additions of the page answer, from one object of each for this board."""

@@ -53,9 +53,12 @@ def test_options_of_shapers_and_of_gains_exclude_each_other(crane: Path) -> None
 
 
 def test_the_advice_of_a_refusal_is_an_option_that_works(crane: Path) -> None:
+    advice = set()
     for model in ((), ("--model", "two-mass-gain"), ("--model", "rational")):
         refused = livebode("tune", crane, "--shaper", *model)
         assert refused.code == 2
         found = re.search(r"choose the model '(\w+)'.*\(option (--\w+)\)", refused.err)
         assert found is not None, refused.err
-        assert livebode("tune", crane, "--shaper", found[2], found[1]).code == 0
+        advice.add((found[2], found[1]))
+    for option in advice:
+        assert livebode("tune", crane, "--shaper", *option).code == 0

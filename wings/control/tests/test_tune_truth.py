@@ -6,6 +6,7 @@ import json
 import re
 import tomllib
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -110,6 +111,37 @@ def test_a_bandwidth_out_of_reach_ends_with_the_best_and_exit_code_two(run: Path
     assert not found["met"]
     assert found["limited_by"]
     assert "the best promises" in done.out + done.err
+
+
+def proposed(run: Path, *options: object) -> Any:
+    done = livebode("tune", run, "--loop-checked", *options, "--json")
+    assert done.code == 0, done.err
+    return json.loads(done.out)
+
+
+def test_what_is_promised_has_the_margins_that_were_required(run: Path) -> None:
+    usual, careful = proposed(run), proposed(
+        run, "--gain-margin-db", 8, "--phase-margin-deg", 45, "--disk-margin", 0.8, "--max-sensitivity", 1.8
+    )  # fmt: skip
+    assert usual["promised"]["disk_margin"] < 0.8 < careful["promised"]["disk_margin"]
+    assert careful["promised"]["gain_margin_db"] >= 8
+    assert careful["promised"]["phase_margin_deg"] >= 45
+    assert careful["promised"]["max_sensitivity"] <= 1.8
+    assert careful["promised"]["bandwidth_hz"] < usual["promised"]["bandwidth_hz"]
+
+
+def test_the_noise_of_the_input_is_at_most_what_was_permitted(run: Path) -> None:
+    usual = proposed(run)["noise"]["after"]
+    limit = 0.7 * (1 + 1e-5)  # the optimiser's tolerance
+    assert proposed(run, "--noise-gain", 0.7 * usual)["noise"]["after"] <= limit * usual
+    step = 2 * np.pi / 2**17
+    rounded = proposed(run, "--encoder-step", step)["noise"]["after"]
+    assert proposed(run, "--encoder-step", step, "--input-noise", 0.7 * rounded)["noise"]["after"] <= limit * rounded
+
+
+def test_lines_below_the_required_coherence_are_not_used(run: Path) -> None:
+    refused = livebode("tune", run, "--loop-checked", "--coherence", 1.0)
+    assert (refused.code, "coherence" in refused.err) == (2, True), refused
 
 
 def test_a_description_that_the_check_contradicts_is_never_tuned(run: Path) -> None:

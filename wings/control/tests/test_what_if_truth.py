@@ -19,7 +19,7 @@ from playwright.sync_api import Browser, Route
 from livebode.analysis import by_place, stable
 from livebode.configuration import LoopSection
 from livebode.core import PID, Algebra, Cascade, Model, Responses
-from livebode.dashboard import Dashboard, Serving
+from livebode.dashboard import Dashboard, ServerSettings
 from livebode.records import RunRecord
 from livebode_control.tuning import LoopSpecification
 from livebode_control.tuning.filters import Biquad, low_pass, notch
@@ -59,7 +59,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def tab(browser: Browser, run: Path) -> Iterator[Tab]:
-    dashboard = Dashboard(Serving("127.0.0.1", 0))
+    dashboard = Dashboard(ServerSettings("127.0.0.1", 0))
     dashboard.view(run)
     with dashboard, Tab(browser, dashboard.url + ADDRESS) as found:
         found.until("bode.drawn['what if'] && whatIf.margins.after")

@@ -75,8 +75,8 @@ def test_a_run_draws_its_pictures_and_is_replaced_with_them(folder: Path) -> Non
         found = livebode(*again, pictures=True)
         assert (found.code, found.err) == (0, "")
     assert sorted(path.name for path in (folder / "drawn").iterdir()) == [
-        "bode.png", "covariance.parquet", "events.jsonl", "responses.parquet", "run-copy.json", "run.json",
-        "singular-values.png",
+        "bode.png", "covariance.parquet", "events.jsonl", "manifest.jsonl", "responses.parquet", "run-copy.json",
+        "run.json", "singular-values.png",
     ]  # fmt: skip
 
 
@@ -207,7 +207,7 @@ def test_what_cannot_be_exported_is_refused_in_one_sentence(folder: Path, option
         (
             "report {0}/before --on {0}/after.parquet --out {0}/r.html",
             "`livebode validate RUN --entry OUTPUT/INPUT --on RUN`",
-            "validate {0}/before --entry velocity1/u1 --on {0}/after --model rational",
+            "validate {0}/before --entry velocity1/u1 --on {0}/after --model modal",
         ),
     ],
 )

@@ -1,4 +1,4 @@
-// Types of what the server sends (state.py, notices.py, trends.py, client.py) and of what the panels share.
+// Types of what the server sends (state.py, notices.py, recent.py, browser_socket.py) and of what the panels share.
 import type { Bode } from "./bode.js";
 import type { Curve } from "./curves.js";
 import type { Mark } from "./marks.js";
@@ -190,7 +190,7 @@ export interface Alarm {
   shelf: { by: string; until_s: number; reason: string } | null;
 }
 
-/** A change of an alarm; see alarm_history.py. */
+/** A change of an alarm; see alarm.py. */
 export interface Transition {
   number: number;
   time_s: number;

@@ -14,9 +14,9 @@ from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 from livebode.configuration import LoopSection, nearest, read_table, shortened
 from livebode.core import ConfigError, nearest_name
 from livebode.estimation import DETECTION_LINES_MIN
+from livebode.excitation import BLOCK_PERIOD_MAX
 from livebode.simulation import BeltAxis, Drive, Friction, Limits, Mechanics, Sensor, Standstill, Strokes
 from livebode.sources.live import MeasureSection, SourceSettings
-from livebode.structured_text import PERIOD_MAX
 from livebode_design._choose import choose
 from livebode_design.belt import belt_machine
 from livebode_design.design import Design
@@ -220,9 +220,9 @@ class Experiment(BaseModel):
     def left_out(self, design: Design) -> dict[str, str]:
         """The formats that are not possible for a design, with the reason."""
         window = design.waveform.lines.window
-        if window <= PERIOD_MAX:
+        if window <= BLOCK_PERIOD_MAX:
             return {}
-        return {".st": f"no .st: its {window} samples are more than the {PERIOD_MAX} of a PLC's table"}
+        return {".st": f"no .st: its {window} samples are more than the {BLOCK_PERIOD_MAX} of a PLC's table"}
 
     def loop_tables(self) -> dict[str, Any]:
         """[loop] of the axis.toml, as in docs/reference/configuration.md."""

@@ -12,8 +12,8 @@ from typing import Any, Literal
 import numpy as np
 
 from livebode.core import DesignError, UsageError, needing, whole_file
-from livebode.excitation import Waveform
-from livebode.structured_text import check_name, multisine
+from livebode.excitation import Waveform, function_block
+from livebode.structured_text import check_name
 from livebode.version import __version__
 
 LETTERS_MAX = {"C": 63, "MATLAB": 31}  # significant in C99; in a struct's name of a MATLAB v5 file
@@ -162,7 +162,7 @@ def write_st(path: Path, waveform: Waveform, name: str) -> None:
     """``FB_name``, limited to the period's own peak by default (w_max); the values are exactly the doubles."""
     check_name(name, "excitation")
     note = "\n".join(as_lines(facts(waveform)))
-    text = multisine(
+    text = function_block(
         waveform.samples, rate_hz=waveform.lines.rate_hz, limit=waveform.peak, name=f"FB_{name}", note=note,
         ramp_periods=waveform.ramp_periods,
     )  # fmt: skip

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from livebode.configuration import recorded_configuration
 from livebode.core import BaselineError, Lines, LivebodeError, MatrixResponses, counted
-from livebode.mimo import mean_matrix
+from livebode.fitting import mean_matrix
 from livebode.records import RunRecord
 from livebode_matrix.settings import MatrixSettings
 

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Floats
 from livebode.core import FitError, GridError, MatrixResponses, needing, widened
+from livebode.fitting import mean_matrix
 from livebode.language import Message
-from livebode.mimo import mean_matrix
 from livebode_matrix.line_correlation import INDEPENDENT, LineCorrelation, RowSteps
 
 ALPHA = 0.01

@@ -7,8 +7,8 @@ from collections.abc import Callable
 import numpy as np
 
 from livebode.core import Lines
+from livebode.excitation import MatrixExcitation
 from livebode.interface import Example, table_of
-from livebode.mimo import MatrixExcitation
 from livebode.simulation import Gantry, GantryLoop
 from livebode.tables import Table
 

@@ -109,7 +109,7 @@ def fit_gantry(
 
     Examples
     --------
-    >>> from livebode.mimo import MatrixExcitation
+    >>> from livebode.excitation import MatrixExcitation
     >>> from livebode_matrix import example_matrix_responses
     >>> fit = fit_gantry(example_matrix_responses(), Gantry())
     >>> abs(fit["left belt's stiffness"] - 4e5) < 2 * fit.bound("left belt's stiffness")

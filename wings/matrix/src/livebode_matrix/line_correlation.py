@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Flags, Floats
 from livebode.core import MatrixResponses
-from livebode.mimo import mean_matrix
+from livebode.fitting import mean_matrix
 
 _STEPS_MIN, _STEPS_MAX = 10, 128
 _MARGIN = 2.0  # standard deviations

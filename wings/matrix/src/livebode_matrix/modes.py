@@ -15,7 +15,7 @@ from livebode.fitting import (
     Hold,
     Kind,
     Outputs,
-    Separated,
+    SeparatedFit,
     assembled,
     check_model,
     outputs_of,
@@ -29,14 +29,14 @@ from livebode_matrix.least_squares import MatrixMinimum
 from livebode_matrix.refinement import refined
 from livebode_matrix.whitening import WeightedMatrix
 
-ModeFit = tuple[Separated, MatrixMinimum]
+ModeFit = tuple[SeparatedFit, MatrixMinimum]
 
 _ROUNDS = 2
 _HOPELESS = 200.0  # by how much more a structure costs with independent entries that is not fitted again
 
 
 def chosen(
-    weighted: WeightedMatrix, outs: Outputs, begun: Sequence[Separated], kind: Kind, *, fixed: bool
+    weighted: WeightedMatrix, outs: Outputs, begun: Sequence[SeparatedFit], kind: Kind, *, fixed: bool
 ) -> list[ModeFit]:
     """Fits by increasing cost, the first without the terms that do not lower it.
 
@@ -52,7 +52,7 @@ def chosen(
         Whether the number of poles remains.
     """
 
-    def fitted(start: Separated) -> ModeFit:
+    def fitted(start: SeparatedFit) -> ModeFit:
         modes, minimum = refined(weighted, outs, start)
         return replace(modes, cost=_cost(weighted, modes, minimum)), minimum
 
@@ -78,8 +78,8 @@ def _by_cost(fit: ModeFit) -> tuple[bool, float]:
     return not fit[0].settled, fit[0].cost
 
 
-def _cost(weighted: WeightedMatrix, of: Separated, minimum: MatrixMinimum) -> float:
-    """−2·ln(likelihood) and the price of the parameters, as that of `Separated`.
+def _cost(weighted: WeightedMatrix, of: SeparatedFit, minimum: MatrixMinimum) -> float:
+    """−2·ln(likelihood) and the price of the parameters, as that of `SeparatedFit`.
 
     Noise whose covariance is estimated makes the errors of a line a complex matrix of Student's distribution: (d + m)·
     ln det(I + N⁻¹·E·S⁻¹·E*/d) + m·ln det N, for m inputs (Gupta and Nagar, Matrix Variate Distributions, 2000, ch. 4).
@@ -235,15 +235,15 @@ def _entry(matrix: MatrixResponses, output: int, input: int, whole: NDArray[np.b
     return replace(entry, valid=entry.valid & whole)
 
 
-def _started(like: MatrixModes, names: tuple[str, ...]) -> Separated:
-    if like.found is None or like.status != "ok" or like.outputs != names:
+def _started(like: MatrixModes, names: tuple[str, ...]) -> SeparatedFit:
+    if like.best is None or like.status != "ok" or like.outputs != names:
         raise FitError(
             "not-fitted",
             "the earlier fit is not valid, or is of other entries",
             "leave `like` out, so that the poles are searched for",
             status=like.status,
         )
-    return like.found
+    return like.best
 
 
 def _residues(names: tuple[str, ...], values: Floats, entries: tuple[str, ...]) -> Complex:

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from livebode.core import Event, FitError, MatrixResponses, Stage, StatefulBase, UsageError, moment
+from livebode.fitting import mean_matrix
 from livebode.language import Message
-from livebode.mimo import mean_matrix
 from livebode.simulation import Gantry
 from livebode_matrix.change import EntryChange, MatrixPair, tail
 from livebode_matrix.gantry_change import CART_PLACE, Cause, compare_gantries

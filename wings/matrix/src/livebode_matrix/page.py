@@ -35,25 +35,25 @@ def matrix_answer(run: ShownRun, asked: Mapping[str, str]) -> dict[str, Any]:
     group, units = run.group, run.units
     if group is None:
         raise RecordError("no-matrix", "this run has one response and no matrix", Message("reload the page"))
-    newest = group.at(run.past.directory, run.past.readable, moment(asked))[-1:]
-    value, sigma = newest.value[0], newest.sigma[0]
+    matrix = group.at(run.past.directory, run.past.readable, moment(asked))[-1:]
+    value, sigma = matrix.value[0], matrix.sigma[0]
     with np.errstate(divide="ignore", invalid="ignore"):
         level, reach = 20 * np.log10(np.abs(value)), _SIGMAS * sigma / np.abs(value)
-        singular = 20 * np.log10(newest.singular_values[0])
+        singular = 20 * np.log10(matrix.singular_values[0])
 
     def entry(o: int, i: int) -> dict[str, Any]:
         return {"db": _plain(level[:, o, i]), "reach": _plain(reach[:, o, i]), "unit": units[o][i]}
 
-    entries = [[entry(o, i) for i in range(len(newest.inputs))] for o in range(len(newest.outputs))]
+    entries = [[entry(o, i) for i in range(len(matrix.inputs))] for o in range(len(matrix.outputs))]
     return group.plain() | {
-        "frequency_hz": newest.frequency_hz.tolist(),
-        "time_s": float(newest.time_s[0]),
-        "dof": _number(newest.dof[0]),
+        "frequency_hz": matrix.frequency_hz.tolist(),
+        "time_s": float(matrix.time_s[0]),
+        "dof": _number(matrix.dof[0]),
         "entries": entries,
-        "reasons": [_counts(newest.reason[0, :, i]) for i in range(len(newest.inputs))],
+        "reasons": [_counts(matrix.reason[0, :, i]) for i in range(len(matrix.inputs))],
         "singular_db": [_plain(singular[:, k]) for k in range(singular.shape[1])],
-        "condition": _plain(newest.condition[0]),
-        "coherence": [_plain(newest.coherence[0, :, o]) for o in range(len(newest.outputs))],
+        "condition": _plain(matrix.condition[0]),
+        "coherence": [_plain(matrix.coherence[0, :, o]) for o in range(len(matrix.outputs))],
     }
 
 

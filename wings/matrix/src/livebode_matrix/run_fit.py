@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from livebode.configuration import FitSection
-from livebode.fitting import Kind
-from livebode.mimo import mean_matrix
+from livebode.fitting import Kind, mean_matrix
 from livebode.records import RunRecord
 from livebode_matrix.modes import MatrixModes, fit_matrix
 

@@ -58,7 +58,7 @@ class MatrixTracker(StatefulBase):
 
     >>> import numpy as np
     >>> from livebode.core import Block, Lines
-    >>> from livebode.mimo import MatrixExcitation
+    >>> from livebode.excitation import MatrixExcitation
     >>> from livebode_matrix import MatrixSettings
     >>> lines = Lines.parse("50:150:50", rate_hz=1000, window=100)
     >>> u = np.tile(MatrixExcitation.orthogonal(lines, 2).samples, 3)

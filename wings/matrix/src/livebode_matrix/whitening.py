@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Floats
 from livebode.core import FitError, MatrixResponses
-from livebode.mimo import mean_matrix
+from livebode.fitting import mean_matrix
 
 ROWS_LEAST = 6
 _ROWS_MAX = 64

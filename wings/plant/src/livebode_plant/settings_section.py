@@ -87,6 +87,6 @@ def _section(settings: type[SettingsSection], names: list[str]) -> type[Settings
     for name in names:
         kind = settings.model_fields[name].annotation
         settings = next(
-            one for one in (kind, *get_args(kind)) if isinstance(one, type) and issubclass(one, SettingsSection)
+            part for part in (kind, *get_args(kind)) if isinstance(part, type) and issubclass(part, SettingsSection)
         )
     return settings

@@ -118,6 +118,7 @@ def test_the_configuration_of_the_server_has_the_limits_and_the_partitions(tmp_p
         (["run"], "give either FLEET.toml or --demo"),
         (["run", "fleet.toml", "--demo"], "give either FLEET.toml or --demo"),
         (["status"], "give either FLEET.toml or --demo AXES"),
+        (["status", "--demo", "6", "--trends", "javascript:x"], "is not an address; begin it with https://"),
         (["setup"], "give either FLEET.toml, for the configuration of a server, or --user"),
         (["setup", "fleet.toml", "--user", "view"], "give either FLEET.toml"),
         (["setup", "--user", "view", "--leaf"], "--leaf and --user exclude each other"),

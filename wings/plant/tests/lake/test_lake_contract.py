@@ -11,7 +11,7 @@ import pytest
 
 from livebode import ArchiveError
 from livebode_plant.lake import TABLES, Key, Lake, compact
-from livebode_plant.lake.data_file import write_data_file
+from tests.support.damaged_lake import write_data_file
 
 
 def rows(name: str, *keys: Key) -> pa.Table:

@@ -17,7 +17,7 @@ import pytest
 from playwright.sync_api import Browser
 
 from livebode.core import LEVELS, DamageWarning
-from livebode.dashboard import Dashboard, Serving
+from livebode.dashboard import Dashboard, ServerSettings
 from livebode_plant.fleet.status_message import encode_names
 from livebode_plant.lake import TABLES, Lake
 from livebode_plant.page.fleet_feed import DemoFeed, DemoFleet
@@ -64,7 +64,7 @@ class Page:
     def __init__(self, lake: str) -> None:
         view = FleetView(DemoFeed(FLEET), lake=lake)
         view.board.process([encode_names(names, time.time())[0] for names in FLEET.names()], time.time())
-        self.dashboard = Dashboard(Serving("127.0.0.1", 0, token=TOKEN, viewer_token=VIEWER))
+        self.dashboard = Dashboard(ServerSettings("127.0.0.1", 0, token=TOKEN, viewer_token=VIEWER))
         self.dashboard.show(view)
 
     def trend(self, axis: str, quantity: str = "", token: str = VIEWER) -> tuple[int, Any]:

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from livebode.analysis import Averaged
+from livebode.analysis import RunMean
 from livebode.configuration import ReportSection, recorded_configuration, recorded_report
 from livebode.core import TONES, Document, Finding, Paragraph, Part, Picture, PrintedTable, Section, with_bound
 from livebode.estimates import kind_of
@@ -353,7 +353,7 @@ def run_name(run: RunRecord) -> str:
     return str(run.path.resolve().name)
 
 
-def _measured(run: RunRecord, average: Averaged) -> str:
+def _measured(run: RunRecord, average: RunMean) -> str:
     """When a run was measured; of one without a clock, when it was written."""
     return first_page.measured_at(run, average.spans_s[0]) or written(run.path / "run.json")
 

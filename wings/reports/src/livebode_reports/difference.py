@@ -8,7 +8,7 @@ from math import log
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.analysis import Averaged, averaged
+from livebode.analysis import RunMean, averaged
 from livebode.arrays import Floats
 from livebode.configuration import TrackingSection, recorded_configuration
 from livebode.core import PER_LINE, GridError, Lines, Response, Responses, same_frequencies, same_rate, widened
@@ -135,7 +135,7 @@ class RunDifferences:
     """
 
     runs: tuple[RunRecord, RunRecord]
-    averages: tuple[Averaged, Averaged]
+    averages: tuple[RunMean, RunMean]
     overall: Difference
     places: tuple[PlaceDifference, ...]
     warnings: tuple[str, ...]
@@ -260,7 +260,7 @@ def _averages(run: RunRecord) -> bool:
     return bool(run.summary.get("configuration", {}).get("tracking", {}).get("average"))
 
 
-def _overlap(both: tuple[Averaged, Averaged], span: tuple[float, float]) -> list[str]:
+def _overlap(both: tuple[RunMean, RunMean], span: tuple[float, float]) -> list[str]:
     spans = Message.conjunction(Message("{low:.4g} … {high:.4g}", low=a.spans[0], high=a.spans[1]) for a in both)
     if span[1] <= span[0]:
         return [

@@ -11,9 +11,9 @@ import numpy as np
 
 from livebode.analysis import (
     MARGINS,
-    Averaged,
     LoopReport,
     ModelTest,
+    RunMean,
     averaged,
     checked_loop,
     fit_averaged,
@@ -105,7 +105,7 @@ class ReportData(RunData):
         The test of the model on independent data, if requested.
     """
 
-    of: Averaged
+    of: RunMean
     fit: Fit | None
     fit_words: str
     loop: LoopReport | None
@@ -169,7 +169,7 @@ def entry_title(run: RunRecord) -> str:
     return "" if run.selected is None else " ← ".join(run.selected)
 
 
-def _fit(configuration: dict[str, Any], of: Averaged) -> tuple[Fit | None, str]:
+def _fit(configuration: dict[str, Any], of: RunMean) -> tuple[Fit | None, str]:
     if "fit" not in configuration:
         return None, tr("No model was fitted: the run has no [fit] section. Use `livebode fit RUN` to fit one.")
     try:
@@ -181,9 +181,7 @@ def _fit(configuration: dict[str, Any], of: Averaged) -> tuple[Fit | None, str]:
     return None, tr("The fit to {what} was rejected: {why}.", what=worded(words), why=worded(fit.sentence))
 
 
-def _loop(
-    run: RunRecord, configuration: dict[str, Any], of: Averaged, fit: Fit | None
-) -> tuple[LoopReport | None, str]:
+def _loop(run: RunRecord, configuration: dict[str, Any], of: RunMean, fit: Fit | None) -> tuple[LoopReport | None, str]:
     section = LoopSection.model_validate(configuration.get("loop", {}))
     described = section.build(of.overview.lines.rate_hz)
     if described.feedback is None:
@@ -212,6 +210,6 @@ def written(path: Path) -> str:
         return ""
 
 
-def by_schedule(of: Averaged) -> bool:
+def by_schedule(of: RunMean) -> bool:
     """Whether the response can be plotted over the schedule."""
     return of.moved and bool(np.isfinite(of.overview.schedule).any())

@@ -41,7 +41,7 @@ def run_report(
     Parameters
     ----------
     directory
-        Run directory, in one piece or in segments, finished or not.
+        Run directory, finished or not.
     judged
         Test of its model on independent data.
     made

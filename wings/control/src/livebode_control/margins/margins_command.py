@@ -24,9 +24,6 @@ def margins_command(
         typer.Option(metavar="AXIS.toml", help="Read \\[loop] and \\[fit] from this file instead of the run."),
     ] = None,
     model: Annotated[str | None, typer.Option(help="rigid, two-mass, … \\[default: the run's \\[fit]]")] = None,
-    radius: Annotated[
-        float | None, typer.Option(metavar="M", help="Radius of the pulley, for a load in linear motion.")
-    ] = None,
     entry: Entry = None,
     max_sensitivity: Annotated[float, typer.Option(help="Largest permitted peak sensitivity Ms.")] = 2.0,
     as_json: Json = False,
@@ -41,8 +38,7 @@ def margins_command(
     from livebode_control.margins.loop_margins import margins_of_run
     from livebode_control.margins.loop_picture import save_loop_picture
 
-    given = {k: v for k, v in {"model": model, "radius_m": radius}.items() if v is not None}
-    section = FitSection.model_validate(given) if given else None
+    section = None if model is None else FitSection(model=model)
     loop = margins_of_run(directory, section, None if axis is None else Axis.read(axis), max_sensitivity, entry)
     into = results_directory(directory)
     if can_draw():

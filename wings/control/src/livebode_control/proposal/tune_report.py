@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from livebode.analysis import by_place, checked_loop
+from livebode.analysis import by_place, checked_loop, equivalent_plant
 from livebode.configuration import LoopSection, check_controllers, matrix_loop, recorded_configuration, recorded_loop
 from livebode.core import PID, Cascade, LivebodeError, Loop, PositionPD, Responses, SignalError, TuneError
+from livebode.fitting import mean_matrix
 from livebode.locations import Location
-from livebode.mimo import equivalent_plant, mean_matrix
 from livebode.motion import FrictionCurve, OutputKind, friction_curve
 from livebode.records import RunRecord, entry_named
 from livebode_control.strokes.motion_samples import read_strokes

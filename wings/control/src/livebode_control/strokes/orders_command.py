@@ -29,9 +29,6 @@ def orders_command(
     angle: Annotated[
         str | None, typer.Option(metavar="CHANNEL", help="Angle of the motor, if the velocity is used.")
     ] = None,
-    turn: Annotated[
-        float | None, typer.Option(metavar="UNITS", help="Units of the angle in a turn. \\[default: 2π]")
-    ] = None,
     shaft: Annotated[
         list[str] | None,
         typer.Option(
@@ -101,7 +98,7 @@ def orders_command(
             samples,
             shafts,
             angle=samples.angle,
-            turn=turn or section.turn,
+            turn=section.turn,
             lines_hz=_lines(time_lines, samples),
             highest_hz=highest or section.highest_hz or float("inf"),
             band_hz=band,

@@ -42,10 +42,6 @@ def validate_command(
         list[str] | None,
         typer.Option(help="rigid, two-mass, … modal; repeat to compare. \\[default: the run's \\[fit]]"),
     ] = None,
-    radius: Annotated[
-        float | None, typer.Option(metavar="M", help="Radius of the pulley, for a load in linear motion.")
-    ] = None,
-    lags: Annotated[int, typer.Option(min=1, help="Largest lag of the correlations, in samples.")] = 40,
     samples: Annotated[int | None, typer.Option(min=1, help="Use only the last ones. \\[default: all]")] = None,
     output: Output = None,
     input: Annotated[str | None, typer.Option(metavar="CHANNEL", help="Channel of the plant input u.")] = None,
@@ -73,13 +69,13 @@ def validate_command(
     check_use(context, "--loop", ("--axis",), ("--output", "--input", "--excitation"))
     channels = {"output": output, "input": input, "excitation": excitation}
     if loop:
-        from livebode_control.loop_check.loop_check_output import validate_loop
+        from livebode_control.loop_check.loop_check_command import validate_loop
 
         validate_loop(directory, axis, channels, as_json=as_json)
     elif on is None:
         raise _nothing_to_validate()
     else:
-        _validate_model(directory, on, model or [], radius, lags, samples, channels, at_lines, entry, as_json=as_json)
+        _validate_model(directory, on, model or [], samples, channels, at_lines, entry, as_json=as_json)
 
 
 def _nothing_to_validate() -> UsageError:
@@ -92,7 +88,7 @@ def _nothing_to_validate() -> UsageError:
 
 
 def _validate_model(
-    directory: Path, on: Path, models: list[str], radius: float | None, lags: int, samples: int | None,
+    directory: Path, on: Path, models: list[str], samples: int | None,
     channels: Channels, at_lines: bool, entry: str | None, *, as_json: bool,
 ) -> None:  # fmt: skip
     """Test the models on a recording or another run, write their picture, and print the verdicts."""
@@ -101,9 +97,7 @@ def _validate_model(
     from livebode.records import RunRecord, to_json
     from livebode_control.validation.run_validation import validate_run
 
-    base = recorded_configuration(RunRecord.open(directory, entry=entry).summary).get("fit", {}) | (
-        {} if radius is None else {"radius_m": radius}
-    )
+    base = recorded_configuration(RunRecord.open(directory, entry=entry).summary).get("fit", {})
     named = [{"model": name} for name in models] or [{}]
     sections = [FitSection.model_validate(base | section) for section in named]
     reasons = [_reason(section, on, at_lines, entry) for section in sections]
@@ -111,7 +105,7 @@ def _validate_model(
     simulated_results: list[Validation] = []
     notes: list[str] = []
     if simulated:
-        simulated_results, notes = validate_run(directory, on, simulated, lags=lags, samples=samples, channels=channels)
+        simulated_results, notes = validate_run(directory, on, simulated, samples=samples, channels=channels)
     drifting = {v.model: v.why_lines for v in simulated_results if v.drifts}
     wanted = [(section, reason) for section, reason in zip(sections, reasons) if reason or drifting]
     line_results: list[LineValidation] = []

@@ -9,8 +9,7 @@ import numpy as np
 
 from livebode.arrays import Floats
 from livebode.core import DesignError, Lines, UsageError, needing
-from livebode.excitation import low_crest_phases
-from livebode.mimo import MatrixExcitation
+from livebode.excitation import MatrixExcitation, low_crest_phases
 from livebode_design.matrix.machine import LimitedPeak, MatrixLimits, MatrixMachine
 from livebode_design.matrix.spec import Kind, MatrixSpec
 

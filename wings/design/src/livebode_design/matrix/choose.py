@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from livebode.core import DesignError, Lines, UsageError, counted
-from livebode.mimo import predict
 from livebode_design.matrix.candidate import (
     REPETITIONS_MAX,
     REPETITIONS_MIN,
@@ -144,7 +143,7 @@ def choose_matrix(spec: MatrixSpec, machine: MatrixMachine, limits: MatrixLimits
     gentle = min(1.0, float(best.ratio.max()) / sqrt(times)) if spec.requires else 1.0
     excitation = best.excitation.scaled(gentle)
     f = lines.frequency_hz
-    unit = predict(excitation, machine.response, 1.0, machine.described).sigma
+    unit = excitation.predict(machine.response, 1.0, machine.described).sigma
     design = MatrixDesign(
         machine=machine,
         limits=limits,

@@ -12,8 +12,8 @@ from annotated_types import Gt
 from numpy.typing import ArrayLike
 
 from livebode.arrays import Complex, Floats
-from livebode.core import UsageError
-from livebode.mimo import MatrixExcitation, MatrixLoop
+from livebode.core import MatrixLoop, UsageError
+from livebode.excitation import MatrixExcitation
 
 _Positive = Annotated[float, Gt(0)]
 _Each = _Positive | Sequence[_Positive]

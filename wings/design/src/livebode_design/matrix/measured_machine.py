@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from livebode.arrays import Complex, Floats
-from livebode.core import Lines, UsageError
-from livebode.mimo import MatrixExcitation, MatrixLoop
+from livebode.core import Lines, MatrixLoop, UsageError
+from livebode.excitation import MatrixExcitation
 from livebode_design.matrix.machine import MatrixMachine
 
 

@@ -10,8 +10,7 @@ from annotated_types import Gt
 from pydantic import BaseModel, ConfigDict
 
 from livebode.configuration import ControllerSection, recorded_configuration, without_null
-from livebode.core import ConfigError, Model, split_plant_unit
-from livebode.mimo import MatrixLoop
+from livebode.core import ConfigError, MatrixLoop, Model, split_plant_unit
 from livebode.records import RunRecord
 from livebode_design.matrix.measured_machine import MeasuredMachine
 

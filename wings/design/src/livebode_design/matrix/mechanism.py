@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from livebode.arrays import Complex, Floats
-from livebode.core import CHANNELS_MAX, UsageError, counted
-from livebode.mimo import MatrixExcitation, MatrixLoop
+from livebode.core import CHANNELS_MAX, MatrixLoop, UsageError, counted
+from livebode.excitation import MatrixExcitation
 from livebode.simulation import MotorLoop
 from livebode_design.matrix.machine import MatrixMachine, each_of
 

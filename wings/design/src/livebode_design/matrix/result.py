@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from livebode.arrays import Complex, Floats
-from livebode.mimo import MatrixExcitation
+from livebode.excitation import MatrixExcitation
 from livebode_design.matrix.machine import LimitedPeak, MatrixLimits, MatrixMachine
 from livebode_design.matrix.spec import HOLDING_95, MatrixSpec
 

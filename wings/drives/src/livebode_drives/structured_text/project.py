@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from numpy.typing import ArrayLike
 
 from livebode.core import Lines, UsageError, counted
+from livebode.excitation import function_block
 from livebode.structured_text import (
     Declared,
     array,
@@ -16,7 +17,6 @@ from livebode.structured_text import (
     check_names,
     check_rate,
     comment,
-    multisine,
     real,
     section,
 )
@@ -225,8 +225,8 @@ class Project:
         Raises
         ------
         UsageError
-            As `multisine`, `sliding_dft`, `ring_type` and `ring_block`; also if the excitation or a tracked signal is
-            not a channel, or has a name that the program uses.
+            As `function_block`, `sliding_dft`, `ring_type` and `ring_block`; also if the excitation or a tracked signal
+            is not a channel, or has a name that the program uses.
         """
         check_signals((self.excitation, *self.tracked), self.counter)
         for name in (self.excitation, *self.tracked):
@@ -242,7 +242,7 @@ class Project:
         check_names(self.columns, "channel", _OWN)
         rate_hz = self.lines.rate_hz
         return {
-            "FB_Multisine.st": multisine(
+            "FB_Multisine.st": function_block(
                 self.period, rate_hz=rate_hz, limit=self.limit, ramp_periods=self.ramp_periods, note=self.note
             ),
             "FB_SlidingDft.st": sliding_dft(self.lines, self.tracked),

@@ -38,13 +38,13 @@ def handle_alone(job: Job, recording: ArchivedRecording, scratch: Path | None = 
     started = time.perf_counter()
     hashed = handle_one(job, replace(recording, recipes=()), scratch)
     results: list[Result] = list(hashed.results)
-    found = next((one.content for one in results if isinstance(one, HashedContent)), recording.content)
-    if not any(isinstance(one, TrackingFailure) for one in results) and not (
-        not recording.content and job.knows(found)
+    content = next((result.content for result in results if isinstance(result, HashedContent)), recording.content)
+    if not any(isinstance(result, TrackingFailure) for result in results) and not (
+        not recording.content and job.knows(content)
     ):
         for recipe in recording.recipes:
-            one = replace(recording, content=found, recipes=(recipe,))
-            results += _tracked_alone(job, one, scratch)
+            alone = replace(recording, content=content, recipes=(recipe,))
+            results += _tracked_alone(job, alone, scratch)
     return RecordingResults(tuple(results), time.perf_counter() - started)
 
 
@@ -80,8 +80,8 @@ def _once_alone(job: Job, recording: ArchivedRecording, scratch: Path | None) ->
                 process.kill()
         result = folder / "result"
         if result.exists():
-            found: Sequence[Result] = pickle.loads(result.read_bytes())
-            return found
+            results: Sequence[Result] = pickle.loads(result.read_bytes())
+            return results
     raise _exceeded(job) if exceeded else _ended(process.returncode)
 
 

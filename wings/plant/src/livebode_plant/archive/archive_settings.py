@@ -28,13 +28,13 @@ class Template:
 
     def checked(self, key: str = "inputs") -> None:
         """ConfigError if a name in braces is not a level of a machine, or is there twice."""
-        names = [found[1] for found in _PARTS.finditer(self.text) if found[0].startswith("{")]
+        names = [part[1] for part in _PARTS.finditer(self.text) if part[0].startswith("{")]
         for name in names:
             if name not in LEVELS or names.count(name) > 1:
-                what = "is there twice" if name in LEVELS else "is not a level of a machine"
+                fault = "is there twice" if name in LEVELS else "is not a level of a machine"
                 raise ConfigError(
                     "value-invalid",
-                    f"{{{name}}} in {self.text!r} {what}",
+                    f"{{{name}}} in {self.text!r} {fault}",
                     "write {site}, {line}, {machine} and {axis}, each once",
                     key=key,
                     value=self.text,
@@ -55,8 +55,8 @@ class Template:
         >>> Template("plant/{machine}/*.csv").machine("plant/press 4/a.csv")
         {'machine': 'press 4'}
         """
-        found = self._expression.fullmatch(place.replace(os.sep, "/"))
-        return found.groupdict() if found else {}
+        match = self._expression.fullmatch(place.replace(os.sep, "/"))
+        return match.groupdict() if match else {}
 
     def filled(self, levels: Mapping[str, str | None]) -> str | None:
         """The path of the machine with these levels; None if a level in braces is not known.
@@ -64,18 +64,18 @@ class Template:
         >>> Template("baselines/{site}-{machine}.json").filled({"site": "Graz", "machine": "press 4"})
         'baselines/Graz-press 4.json'
         """
-        if not all(levels.get(found[1]) for found in _PARTS.finditer(self.text)):
+        if not all(levels.get(part[1]) for part in _PARTS.finditer(self.text)):
             return None
-        return _PARTS.sub(lambda found: levels[found[1]] or "", self.text)
+        return _PARTS.sub(lambda part: levels[part[1]] or "", self.text)
 
     @property
     def _expression(self) -> re.Pattern[str]:
         parts, end = [], 0
         text = self.text.replace(os.sep, "/")
-        for found in _PARTS.finditer(text):
-            parts.append(re.escape(text[end : found.start()]))
-            parts.append(_WILD.get(found[0]) or f"(?P<{found[1]}>[^/]+)")
-            end = found.end()
+        for part in _PARTS.finditer(text):
+            parts.append(re.escape(text[end : part.start()]))
+            parts.append(_WILD.get(part[0]) or f"(?P<{part[1]}>[^/]+)")
+            end = part.end()
         return re.compile("".join([*parts, re.escape(text[end:])]))
 
 
@@ -194,7 +194,7 @@ class ArchiveSettings(SettingsFile):
     @property
     def templates(self) -> list[Template]:
         """The inputs."""
-        return [Template(one) for one in self.inputs]
+        return [Template(text) for text in self.inputs]
 
     def axes(self) -> dict[str, Axis]:
         """The axes of the recipe by name, whose source.log is a placeholder; a single one has the empty name.
@@ -204,7 +204,7 @@ class ArchiveSettings(SettingsFile):
         ConfigError
             If the recipe is not a configuration of axes without a source, or inputs name the axis as well.
         """
-        found = {}
+        axes = {}
         for name, data in tables_of(read_table(self.recipe), str(self.recipe)).items():
             place = f"{self.recipe}, axis {name}" if name else str(self.recipe)
             if name and any("{axis}" in text for text in self.inputs):
@@ -214,8 +214,8 @@ class ArchiveSettings(SettingsFile):
                     "write * in place of {axis}",
                     key="inputs",
                 ).at(str(self.recipe))
-            found[name] = self._axis(name, data, place)
-        return found
+            axes[name] = self._axis(name, data, place)
+        return axes
 
     def _axis(self, name: str, data: dict[str, Any], place: str) -> Axis:
         source = data.get("source", {})

@@ -62,7 +62,7 @@ class ArchivedRecording:
 
     @property
     def size_bytes(self) -> int:
-        """Its length."""
+        """Length of the file."""
         return self.place.size_bytes
 
 
@@ -76,14 +76,14 @@ def find_places(templates: Iterable[Template]) -> list[RecordingPlace]:
     LocationError, ExtraError
         If a storage cannot be used.
     """
-    found: dict[str, RecordingPlace] = {}
+    places: dict[str, RecordingPlace] = {}
     templates = list(templates)
     for template in templates:
-        for one in find(template.pattern):
-            url = one.url.absolute() if isinstance(one.url, Path) else one.url
+        for file in find(template.pattern):
+            url = file.url.absolute() if isinstance(file.url, Path) else file.url
             machine = tuple(template.machine(str(url)).items())
-            found.setdefault(str(url), RecordingPlace(url, one.size_bytes or 0, one.version, machine))
-    if not found:
+            places.setdefault(str(url), RecordingPlace(url, file.size_bytes or 0, file.version, machine))
+    if not places:
         patterns = [template.text for template in templates]
         raise ArchiveError(
             "no-recordings",
@@ -91,7 +91,7 @@ def find_places(templates: Iterable[Template]) -> list[RecordingPlace]:
             "check inputs: * is any name in one directory, ** any number of directories",
             inputs=patterns,
         )
-    return [found[name] for name in sorted(found)]
+    return [places[name] for name in sorted(places)]
 
 
 def known_contents(lake: Lake) -> tuple[dict[tuple[str, str], str], dict[int, set[str]]]:
@@ -99,8 +99,8 @@ def known_contents(lake: Lake) -> tuple[dict[tuple[str, str], str], dict[int, se
     table = lake.read("files", ["url", "version", "content", "size_bytes"])
     url, version, content, size = (table[name].to_pylist() for name in ("url", "version", "content", "size_bytes"))
     by_size: dict[int, set[str]] = {}
-    for one, size_bytes in zip(content, size):
-        by_size.setdefault(size_bytes, set()).add(one)
+    for digest, size_bytes in zip(content, size):
+        by_size.setdefault(size_bytes, set()).add(digest)
     return dict(zip(zip(url, version), content)), by_size
 
 
@@ -118,17 +118,17 @@ def untracked(
     contents: Iterable[tuple[RecordingPlace, str]], recipes: Iterable[str], skipped: set[tuple[str, ...]]
 ) -> list[ArchivedRecording]:
     """Each content once, at its first place, with the recipes whose key is not skipped, if there are any."""
-    found: dict[str, ArchivedRecording] = {}
+    recordings: dict[str, ArchivedRecording] = {}
     recipes = tuple(recipes)
     for place, content in contents:
         missing = tuple(recipe for recipe in recipes if Key(content, recipe) not in skipped)
         if missing:
-            found.setdefault(content, ArchivedRecording(place, missing, content))
-    return longest_first(found.values())
+            recordings.setdefault(content, ArchivedRecording(place, missing, content))
+    return longest_first(recordings.values())
 
 
 def longest_first(recordings: Iterable[ArchivedRecording]) -> list[ArchivedRecording]:
-    """In the order in which they are distributed."""
+    """Recordings in the order in which they are distributed."""
     return sorted(recordings, key=lambda one: (-one.size_bytes, one.content, str(one.place.url)))
 
 
@@ -202,7 +202,7 @@ class RecordingResults:
     @property
     def again(self) -> bool:
         """Whether to try again alone: what the content is the reason of has the same result each time."""
-        return any(isinstance(one, TrackingFailure) and not one.by_content for one in self.results)
+        return any(isinstance(result, TrackingFailure) and not result.by_content for result in self.results)
 
 
 def failed(place: RecordingPlace, error: Exception, content: str = "", recipe: str = "") -> TrackingFailure:
@@ -222,7 +222,7 @@ def failed(place: RecordingPlace, error: Exception, content: str = "", recipe: s
 
 def each_result(handled: Iterable[RecordingResults]) -> list[Result]:
     """The results of several recordings."""
-    return [result for one in handled for result in one.results]
+    return [result for recording in handled for result in recording.results]
 
 
 def lost(recording: ArchivedRecording) -> RecordingResults:

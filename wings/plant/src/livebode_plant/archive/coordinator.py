@@ -235,13 +235,13 @@ class Coordinator:
             return untracked(contents, recipes, skipped)
 
         new = [place for place in places if place.known_as not in known]
-        lengths = Counter(place.size_bytes for place in (*new, *(one.place for one in waiting())))
+        lengths = Counter(place.size_bytes for place in (*new, *(recording.place for recording in waiting())))
         alike = [place for place in new if not place.size_bytes or lengths[place.size_bytes] > 1]
         for result in self._handle("reading", [ArchivedRecording(place) for place in alike], stack):
             if isinstance(result, HashedContent):
                 known[result.place.known_as] = result.content
         single = [ArchivedRecording(place, recipes) for place in new if lengths[place.size_bytes] == 1]
-        candidates = {content for one in single for content in by_size.get(one.size_bytes, ())}
+        candidates = {content for recording in single for content in by_size.get(recording.size_bytes, ())}
         done = {content for content in candidates if all((content, recipe) in skipped for recipe in recipes)}
         self._job = replace(self._job, known=frozenset(map(short, done)))
         return longest_first([*waiting(), *single])
@@ -257,15 +257,15 @@ class Coordinator:
         self._outcome.remaining = len(recordings) if tracking else 0
         try:
             for handled in self._distributed(stage, recordings, stack, alone):
-                found = each_result(handled)
-                self._count(found)
+                new = each_result(handled)
+                self._count(new)
                 if tracking:
                     self._outcome.remaining -= len(handled)
                     self._outcome.known += sum(
-                        all(isinstance(x, HashedContent) for x in one.results) for one in handled
+                        all(isinstance(result, HashedContent) for result in recording.results) for recording in handled
                     )
-                results += [] if tracking else found
-                committer.add(found)
+                results += [] if tracking else new
+                committer.add(new)
         finally:
             committer.commit()
         return results
@@ -291,7 +291,7 @@ class Coordinator:
             cluster, groups, together, alone_task, attrgetter("again"), lost
         )
         work.last.extend(recordings if alone else ())
-        done, done_bytes, total_bytes = 0, 0, sum(one.size_bytes for one in recordings)
+        done, done_bytes, total_bytes = 0, 0, sum(recording.size_bytes for recording in recordings)
         self._report(Progress(stage, 0, len(recordings), 0, total_bytes, cluster.dashboard))
         try:
             for pairs in work.results():

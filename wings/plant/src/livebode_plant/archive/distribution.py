@@ -76,7 +76,6 @@ def _size(item: SizedItem) -> int:
     return max(item.size_bytes, 1)
 
 
-S = TypeVar("S", bound=SizedItem)
 R = TypeVar("R")
 
 _IN_FLIGHT = 2
@@ -145,15 +144,15 @@ class Distribution(Generic[S, R]):
                 future = self._arrived.get(timeout=_COUNT_AGAIN_S)
             except Empty:
                 continue
-            if found := self._taken(future):
-                yield found
+            if pairs := self._taken(future):
+                yield pairs
 
     def ready(self) -> list[tuple[S, R]]:
         """The results that have arrived and were not given yet; the rest is dropped."""
-        found = [pair for future in list(self._tasks) if future.status == "finished" for pair in self._taken(future)]
+        results = [pair for future in list(self._tasks) if future.status == "finished" for pair in self._taken(future)]
         self.cluster.client.cancel(list(self._tasks), force=True)
         self._tasks.clear()
-        return found
+        return results
 
     def _expect(self, future: Any, task: tuple[list[S], bool]) -> None:
         self._tasks[future] = task
@@ -182,13 +181,13 @@ class Distribution(Generic[S, R]):
         if future.status not in ("finished", "pending"):
             return self._try_again(items, alone)
         try:
-            found = future.result(timeout=_COUNT_AGAIN_S)
+            handled = future.result(timeout=_COUNT_AGAIN_S)
         except TimeoutError:  # it was on a worker that was lost since then, and is computed again
             self._expect(future, task)
             return []
         except (KilledWorker, FutureCancelledError):
             return self._try_again(items, alone)
-        results = [found] if alone else found
+        results = [handled] if alone else handled
         final = []
         for item, result in zip(items, results):
             if not alone and self.again(result):

@@ -51,7 +51,7 @@ class HealthyRuns:
 
     @property
     def levels(self) -> dict[str, str | None]:
-        """Its site, line, machine and axis."""
+        """Site, line, machine and axis of the runs."""
         return {level: self.runs[0].row[level] for level in LEVELS}
 
     def check(self) -> None:
@@ -100,7 +100,7 @@ def contents_of(lake: Lake, names: Sequence[str]) -> list[str]:
     """
     tables = [lake.read(name, ["content", "url"]).to_pylist() for name in ("runs", "files")] if names else []
     known = {(row["content"], row["url"]) for rows in tables for row in rows}
-    found = []
+    contents = []
     for name in names:
         own = {content for content, url in known if _means(name, content, url)}
         if not own:
@@ -111,8 +111,8 @@ def contents_of(lake: Lake, names: Sequence[str]) -> list[str]:
                 argument="exclude",
                 value=name,
             )
-        found += sorted(own)
-    return found
+        contents += sorted(own)
+    return contents
 
 
 def _means(name: str, content: str, url: str) -> bool:
@@ -168,11 +168,11 @@ def _changes(lake: Lake, of: Selection) -> tuple[dict[str, list[str]], dict[str,
         return jumps, drifts
     for assessment in assess(histories(lake, of), LIMIT_PERCENT):
         history = assessment.history
-        for one in assessment.ranked:
-            if one.significant:
-                jumped = any(change.kind == "jump" for change in one.trend.changes)
-                words = sentence(one, history.name, history.unit_of(one.machine)).rstrip(".")
-                (jumps if jumped else drifts).setdefault(one.machine, []).append(words)
+        for ranked in assessment.ranked:
+            if ranked.significant:
+                jumped = any(change.kind == "jump" for change in ranked.trend.changes)
+                words = sentence(ranked, history.name, history.unit_of(ranked.machine)).rstrip(".")
+                (jumps if jumped else drifts).setdefault(ranked.machine, []).append(words)
     return jumps, drifts
 
 
@@ -245,12 +245,12 @@ def _axis(run: LakeRun, configuration: Mapping[str, dict[str, object]], log: str
 
 def _places(lake: Lake, runs: Sequence[LakeRun]) -> dict[str, list[str]]:
     """Where the recording of each run was found, first the place from which it was tracked."""
-    found = {run.key.content: [str(run.row["url"])] for run in runs}
-    own = pc.field("content").isin(pa.array(list(found), pa.string()))
+    places = {run.key.content: [str(run.row["url"])] for run in runs}
+    own = pc.field("content").isin(pa.array(list(places), pa.string()))
     for row in lake.read("files", ["content", "url"], own).sort_by("url").to_pylist():
-        if row["url"] not in found[row["content"]]:
-            found[row["content"]].append(row["url"])
-    return found
+        if row["url"] not in places[row["content"]]:
+            places[row["content"]].append(row["url"])
+    return places
 
 
 def _recording(run: LakeRun, places: Sequence[str], copies: ExitStack) -> Path:

@@ -339,12 +339,12 @@ def _results(job: Job, recording: ArchivedRecording, scratch: Path | None) -> It
 
 def _result(job: Job, recording: ArchivedRecording, path: Path, key: Key, scratch: Path | None) -> Result:
     try:
-        found = track(job, recording.place, path, key, scratch)
+        result = track(job, recording.place, path, key, scratch)
         if content_sha256(path) != key.content:
             raise _changed(recording.place.url)
     except Exception as error:
         return failed(recording.place, error, *key)
-    return found
+    return result
 
 
 def _changed(url: object) -> ArchiveError:

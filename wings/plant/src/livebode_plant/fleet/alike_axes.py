@@ -66,7 +66,7 @@ class UsualSpectra(NamedTuple):
         sequencer: Sequencer,
         pipeline: SingleResponse,
     ) -> UsualSpectra | None:
-        """Those that follow this message, if the sequencer returned these Blocks for it; None if it was not usual."""
+        """Spectra that follow this message, if the sequencer returned these Blocks for it; None if it was not usual."""
         tracker, layout = pipeline.follower, sequencer.schema.spectra
         if layout is None or len(blocks) != 1 or len(blocks[0]) != 1 or not sequencer.is_idle:
             return None
@@ -185,9 +185,9 @@ class UnfittedOutput(NamedTuple):
 
 
 class StackedRows(NamedTuple):
-    """A response of each of several streams: places among the streams, numbers of the responses, and a row for each."""
+    """A response of each of several streams: indices of the streams, numbers of the responses, and a row for each."""
 
-    at: list[int]
+    indices: list[int]
     numbers: list[int]
     responses: Responses
 
@@ -198,14 +198,14 @@ def outputs_together(streams: Sequence[AxisStream]) -> list[Output]:
     stacks, outputs = stacked_together(streams)
     rows: dict[int, list[tuple[int, Responses]]] = {}
     for stack in stacks:
-        for row, (i, number) in enumerate(zip(stack.at, stack.numbers)):
+        for row, (i, number) in enumerate(zip(stack.indices, stack.numbers)):
             rows.setdefault(i, []).append((number, stack.responses[row : row + 1]))
-    for i, found in rows.items():
-        events, after = [], None
+    for i, own in rows.items():
+        events, after = [], []
         if i in outputs:
-            events, after = outputs[i].events, outputs[i].responses
-        every = Responses.join([*(one for _, one in found), *([] if after is None else [after])])
-        outputs[i] = Output(found[0][0], every, NO_ROWS, (), events)
+            events, after = outputs[i].events, [outputs[i].responses]
+        every = Responses.join([row for _, row in own] + [batch for batch in after if batch is not None])
+        outputs[i] = Output(own[0][0], every, NO_ROWS, (), events)
     return [outputs[i] for i in range(len(streams))]
 
 
@@ -231,28 +231,30 @@ def stacked_together(streams: Sequence[AxisStream]) -> tuple[list[StackedRows], 
                 break
             if responses is None:
                 break
-            at = [i for i, one in zip(members, taken) if one]
-            stack = StackedRows(at, [streams[i].stacked() for i in at], responses)
-            if (usual := streams[at[0]].usual) is not None and usual.results_only:
+            indices = [i for i, has_response in zip(members, taken) if has_response]
+            stack = StackedRows(indices, [streams[i].stacked() for i in indices], responses)
+            if (usual := streams[indices[0]].usual) is not None and usual.results_only:
                 stacks.append(stack)
             else:
-                rows = enumerate(zip(at, stack.numbers))
+                rows = enumerate(zip(indices, stack.numbers))
                 tracked |= {i: streams[i].unfitted(number, responses[row : row + 1]) for row, (i, number) in rows}
-            members = [i for i in at if streams[i].spectra]
-    done = {i for stack in stacks for i in stack.at} | tracked.keys()
-    tracked |= {i: one.tracked() for i, one in enumerate(streams) if i not in done or one.has_more}
+            members = [i for i in indices if streams[i].spectra]
+    done = {i for stack in stacks for i in stack.indices} | tracked.keys()
+    tracked |= {i: stream.tracked() for i, stream in enumerate(streams) if i not in done or stream.has_more}
     return stacks, dict(zip(tracked, _fitted_together([streams[i] for i in tracked], [*tracked.values()])))
 
 
 def _fitted_together(streams: Sequence[AxisStream], tracked: Sequence[UnfittedOutput]) -> list[Output]:
     """What these become; the fits of all axes are one computation."""
-    at = [i for i, one in enumerate(tracked) if len(one.to_fit)]
+    indices = [i for i, output in enumerate(tracked) if len(output.to_fit)]
     fits, batches = [], []
-    for i in at:
-        found, stages = tracked[i].responses, streams[i].pipeline
-        assert found is not None
+    for i in indices:
+        responses, stages = tracked[i].responses, streams[i].pipeline
+        assert responses is not None
         assert stages.fits is not None
         fits.append(stages.fits)
-        batches.append(found[tracked[i].to_fit])
-    fitted: dict[int, Fitted | Exception] = dict(zip(at, process_together(fits, batches)))
-    return [stream.finished(one, fitted.get(i, ((), []))) for i, (stream, one) in enumerate(zip(streams, tracked))]
+        batches.append(responses[tracked[i].to_fit])
+    fitted: dict[int, Fitted | Exception] = dict(zip(indices, process_together(fits, batches)))
+    return [
+        stream.finished(output, fitted.get(i, ((), []))) for i, (stream, output) in enumerate(zip(streams, tracked))
+    ]

@@ -160,9 +160,9 @@ class AxisStream(StatefulBase):
     def _read_spectra(self) -> None:
         """Process usual messages like any others: they are not tracked with those of other axes."""
         spectra, self.spectra = self.spectra, []
-        for one in spectra:
+        for spectrum in spectra:
             assert self.usual is not None
-            self._add_blocks(one.position, one.end, [self._block(one)], self.usual.size_bytes)
+            self._add_blocks(spectrum.position, spectrum.end, [self._block(spectrum)], self.usual.size_bytes)
 
     def _block(self, spectrum: PendingSpectrum) -> LiveBlock:
         batch = read_message(spectrum.message, spectrum.log_s).with_kinds(self._axis.source.kinds)
@@ -188,8 +188,8 @@ class AxisStream(StatefulBase):
         self._track()
         first, responses, self._responses = self.responses, self._responses, []
         self.responses += sum(map(len, responses))
-        found = responses[0] if len(responses) == 1 else Responses.join(responses) if responses else None
-        return self.unfitted(first, found)
+        every = responses[0] if len(responses) == 1 else Responses.join(responses) if responses else None
+        return self.unfitted(first, every)
 
     def unfitted(self, number: int, responses: Responses | None) -> UnfittedOutput:
         """These responses, from this number on, with the events until now."""
@@ -215,17 +215,17 @@ class AxisStream(StatefulBase):
     def finished(self, tracked: UnfittedOutput, fitted: Fitted | Exception) -> Output:
         """The output, with the fits of the responses that `tracked` lists, or why there are none; monitors both."""
         parameters, events = ((), []) if isinstance(fitted, Exception) else fitted
-        found = [*tracked.events, *events]
+        stored = [*tracked.events, *events]
         try:
             if isinstance(fitted, Exception):
                 raise fitted
-            found += self._monitored(tracked.responses, parameters)
+            stored += self._monitored(tracked.responses, parameters)
         except Exception as error:
             self._fail(error)
-            found += self._new_events()
-        self._remember(found, parameters)
+            stored += self._new_events()
+        self._remember(stored, parameters)
         return Output(
-            tracked.number, tracked.responses, tracked.number + tracked.to_fit, parameters, self._limits.process(found)
+            tracked.number, tracked.responses, tracked.number + tracked.to_fit, parameters, self._limits.process(stored)
         )
 
     def _monitored(self, responses: Responses | None, parameters: tuple[Parameters, ...]) -> list[Event]:
@@ -285,20 +285,20 @@ class AxisStream(StatefulBase):
         self._read_spectra()
         taken, self._added = self._added, []
         for part in taken:
-            found: list[Responses] = []
+            tracked: list[Responses] = []
             if not self.failure:
                 try:
-                    found += map(self._tracked, join_blocks(part.blocks))
+                    tracked += map(self._tracked, join_blocks(part.blocks))
                 except Exception as error:
                     self._fail(error)
-            if sum(one.value.size for one in found) * RESPONSE_BYTES > _OUTPUT_BYTES_MAX:
-                what = Message(
+            if sum(batch.value.size for batch in tracked) * RESPONSE_BYTES > _OUTPUT_BYTES_MAX:
+                message = Message(
                     "message {log_message} of the log has too many samples: its responses were dropped",
                     log_message=part.position,
                 )
-                self._tracked_events.append(Event("malformed", *part.end, what))
-                found = []
-            self._responses += [one for one in found if len(one)]
+                self._tracked_events.append(Event("malformed", *part.end, message))
+                tracked = []
+            self._responses += [batch for batch in tracked if len(batch)]
 
     def _new_pipeline(self, rate_hz: float) -> SingleResponse:
         schema = self._sequencer.schema
@@ -320,8 +320,8 @@ class AxisStream(StatefulBase):
         if not isinstance(error, LivebodeError):
             _logger.exception("internal error at message %d of the log", self.position)
         self.failure = (str(error) or type(error).__name__)[:_FAILURE_LETTERS_MAX]
-        what = Message("the axis is not tracked any more: {why}", why=self.failure)
-        self._tracked_events.append(Event("axis-failed", *self._events.position, what))
+        message = Message("the axis is not tracked any more: {why}", why=self.failure)
+        self._tracked_events.append(Event("axis-failed", *self._events.position, message))
 
     @property
     def _identity(self) -> str:

@@ -109,15 +109,15 @@ class SimulatedMachines:
         """The batch of an axis with this number."""
         samples = round(BLOCK_S * RATE_HZ)
         first = number * samples
-        at = np.arange(first, first + samples) % self._signals.shape[1]
-        data = self._signals[:, at]
+        places = np.arange(first, first + samples) % self._signals.shape[1]
+        data = self._signals[:, places]
         noise = np.random.default_rng([axis, number]).standard_normal(samples)
         data[2] *= 1 + 0.01 * axis
         data[2] += 1e-3 * noise
         return Batch(first, data.astype("f4").astype("f8"), self._channels, RATE_HZ, epoch=axis + 1)
 
     def __enter__(self) -> Self:
-        self._taking = self._threads.submit(self._take)
+        self._measuring = self._threads.submit(self._measure)
         self._sending = self._threads.submit(self._send)
         return self
 
@@ -126,21 +126,21 @@ class SimulatedMachines:
         self._threads.shutdown()
         for buffer in self._buffers:
             buffer.close()
-        self._taking.result()
+        self._measuring.result()
         self._sending.result()
 
-    def _take(self) -> None:
+    def _measure(self) -> None:
         began = time.monotonic()
         while not self._ended.wait(max(0.0, began + (self.sent + 1) * BLOCK_S - time.monotonic())):
-            self._take_batches(self.sent)
+            self._add_batches(self.sent)
             self.sent += 1
 
-    def _take_batches(self, number: int) -> None:
+    def _add_batches(self, number: int) -> None:
         for axis, edge in enumerate(self._edges):
             edge.add(self.batch(axis, number))
 
     def _send(self) -> None:
-        edges = [(edge, self._taking) for edge in self._edges]
+        edges = [(edge, self._measuring) for edge in self._edges]
         asyncio.run(send_edges(self._settings.log, edges, threading.Event()))
 
 

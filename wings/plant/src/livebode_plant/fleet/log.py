@@ -17,8 +17,8 @@ from typing import Any, TypeVar
 from livebode.core import FleetError
 from livebode_plant.fleet import subjects
 from livebode_plant.fleet.connection import connected
-from livebode_plant.fleet.consumer import Consumer
 from livebode_plant.fleet.fleet_settings import LogSection
+from livebode_plant.fleet.reader import Consumer, StoredMessage
 from livebode_plant.fleet.subjects import LOG_STREAM
 
 _WORD = "partitions"
@@ -87,17 +87,6 @@ class OtherLastError(Exception):
     def __init__(self, last: int, repeated: bool) -> None:
         super().__init__(last)
         self.last, self.repeated = last, repeated
-
-
-@dataclass(frozen=True)
-class StoredMessage:
-    """A message of a stream: its number there, its data, and when the server received it, seconds since 1970."""
-
-    subject: str
-    number: int
-    data: bytes
-    write: str
-    stored_s: float
 
 
 @dataclass(frozen=True)
@@ -187,13 +176,13 @@ class FleetLog:
 
         async def create() -> None:
             try:
-                found = (await self._js.stream_info(stream.name)).config
+                config = (await self._js.stream_info(stream.name)).config
             except NotFoundError:
                 await self._js.add_stream(stream)
                 return
             limits = {name: getattr(stream, name) for name in _LIMITS if getattr(stream, name) is not None}
-            if update and any(getattr(found, name) != value for name, value in limits.items()):
-                await self._js.update_stream(found.evolve(**limits))
+            if update and any(getattr(config, name) != value for name, value in limits.items()):
+                await self._js.update_stream(config.evolve(**limits))
 
         await self._repeated(create)
 
@@ -292,8 +281,8 @@ class FleetLog:
 
     async def following(self, stream: str, subject: str, number: int) -> int | None:
         """Number of the first message of a subject that is at least `number`."""
-        found = await self._next(stream, subject, number)
-        return None if found is None else found.number
+        message = await self._next(stream, subject, number)
+        return None if message is None else message.number
 
     async def first_since(self, stream: str, subject: str, at_s: float) -> int:
         """Number from which on the messages of a subject were stored at this time or later, seconds since 1970."""
@@ -301,11 +290,11 @@ class FleetLog:
         low, high = extent.first, extent.last + 1
         while low < high:  # between them is the first one
             middle = (low + high) // 2
-            found = await self._next(stream, subject, middle)
-            if found is None or found.stored_s >= at_s:
+            message = await self._next(stream, subject, middle)
+            if message is None or message.stored_s >= at_s:
                 high = middle
             else:
-                low = found.number + 1
+                low = message.number + 1
         return low
 
     async def _next(self, stream: str, subject: str, number: int) -> StoredMessage | None:

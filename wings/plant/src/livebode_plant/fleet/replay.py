@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from hashlib import blake2b
@@ -25,10 +25,9 @@ from livebode_plant.fleet.result_message import (
     PARAMETERS,
     ROWS,
     AxisFits,
-    AxisRows,
+    PendingResults,
     ResultMessage,
     parameter_table,
-    response_table,
 )
 from livebode_plant.fleet.subjects import LOG, LOG_STREAM, RESULT_STREAM, RESULTS, axis_path, key_of
 
@@ -105,13 +104,13 @@ class CheckResult:
         return {"exact": self.exact, "claims": self.claims, "messages": self.messages, "axes": axes}
 
 
-class _StoredDigests:
-    """Digests of the stored results, and for each partition the message up to which they are complete."""
+class _ResultDigests:
+    """Digests of results by run, and for each partition the message up to which they are complete."""
 
     def __init__(self) -> None:
         self.responses: dict[Run, list[tuple[int, bytes]]] = {}
-        self.parameters: dict[Run, Counter[bytes]] = {}
-        self.events: dict[Run, Counter[bytes]] = {}
+        self.parameters: dict[Run, Counter[bytes]] = defaultdict(Counter)
+        self.events: dict[Run, Counter[bytes]] = defaultdict(Counter)
         self.recipes: dict[Run, str] = {}
         self.through: dict[str, int] = {}
         self.claims = 0
@@ -139,7 +138,7 @@ async def check_results(log: FleetLog, axes: Mapping[str, Axis]) -> CheckResult:
     FleetError
         If the log no longer has its beginning.
     """
-    stored = _StoredDigests()
+    stored = _ResultDigests()
     extent = await log.extent(RESULT_STREAM)
     async for message in stored_messages(log, RESULT_STREAM, f"{RESULTS}.*", extent.last, extent.first):
         stored.add(message.subject.split(".")[1], ResultMessage.from_bytes(message.data))
@@ -158,17 +157,14 @@ async def check_results(log: FleetLog, axes: Mapping[str, Axis]) -> CheckResult:
 
 
 class _Again:
-    """The uninterrupted computation: a stream for each run of each axis."""
+    """The uninterrupted computation: a stream for each run of each axis, whose outputs become messages of results."""
 
-    def __init__(self, axes: Mapping[str, Axis], stored: _StoredDigests) -> None:
-        self._axes, self._stored = axes, stored
+    def __init__(self, axes: Mapping[str, Axis], stored: _ResultDigests) -> None:
+        self._axes, self._stored, self._expected = axes, stored, _ResultDigests()
         self._runs: dict[str, list[int]] = {}
         for key, run in stored.recipes:
             self._runs.setdefault(key, []).append(run)
         self._streams: dict[str, AxisStream] = {}
-        self._expected: dict[Run, dict[int, bytes]] = {}
-        self._parameters: dict[Run, Counter[bytes]] = {}
-        self._events: dict[Run, Counter[bytes]] = {}
 
     def process(self, subject: str, data: bytes, number: int, stored_s: float) -> None:
         key, partition = key_of(subject), subject.split(".")[1]
@@ -176,36 +172,24 @@ class _Again:
             return
         if key not in self._streams or number in self._runs.get(key, ()):
             self._streams[key] = AxisStream(self._axes[key], number)
-        stream = self._streams[key]
-        output = stream.process(data, number, stored_s)
-        if output.responses is not None:
-            rows = response_table([AxisRows.of(key, stream.run, output.number, output.responses)])
-            for _, run, response, digest in _digests(rows):
-                self._expected.setdefault((key, run), {})[response] = digest
-        fits = [AxisFits(key, stream.run, output.fitted, one) for one in output.parameters]
-        _count(self._parameters, _fitted_digests(parameter_table(fits)))
-        _count(self._events, [(key, stream.run, _event_digest(asdict(event))) for event in output.events])
+        stream, pending = self._streams[key], PendingResults()
+        pending.add(key, stream, stream.process(data, number, stored_s))
+        self._expected.add(partition, pending.message(number, ""))
 
     def verdicts(self) -> dict[str, AxisCheck]:
-        found: dict[str, AxisCheck] = {axis_path(key): AxisCheck() for key in sorted(self._axes)}
-        stored = self._stored
-        for run in sorted(self._expected.keys() | self._events.keys() | stored.recipes.keys()):
-            verdict = found.setdefault(axis_path(run[0]), AxisCheck())
+        verdicts: dict[str, AxisCheck] = {axis_path(key): AxisCheck() for key in sorted(self._axes)}
+        stored, expected = self._stored, self._expected
+        for run in sorted(expected.recipes.keys() | stored.recipes.keys()):
+            verdict = verdicts.setdefault(axis_path(run[0]), AxisCheck())
             responses = stored.responses.get(run, [])
             stream = self._streams.get(run[0])
             if run in stored.recipes and (stream is None or stored.recipes[run] != stream.recipe):
                 verdict.other_recipe += len(responses)
                 continue
-            _compare(verdict, self._expected.get(run, {}), responses)
-            rows = self._parameters.get(run, Counter()), stored.parameters.get(run, Counter())
-            events = self._events.get(run, Counter()), stored.events.get(run, Counter())
-            verdict.parameters += rows[0].total()
-            verdict.parameters_missing += (rows[0] - rows[1]).total()
-            verdict.parameters_unexpected += (rows[1] - rows[0]).total()
-            verdict.events += events[0].total()
-            verdict.events_missing += (events[0] - events[1]).total()
-            verdict.events_unexpected += (events[1] - events[0]).total()
-        return found
+            _compare(verdict, dict(expected.responses.get(run, ())), responses)
+            _compare_rows(verdict, "parameters", expected.parameters[run], stored.parameters[run])
+            _compare_rows(verdict, "events", expected.events[run], stored.events[run])
+        return verdicts
 
 
 def _compare(verdict: AxisCheck, expected: Mapping[int, bytes], stored: list[tuple[int, bytes]]) -> None:
@@ -215,6 +199,12 @@ def _compare(verdict: AxisCheck, expected: Mapping[int, bytes], stored: list[tup
     verdict.doubled += sum(times.values()) - len(times)
     verdict.unexpected += len(times.keys() - expected.keys())
     verdict.different += sum(number in expected and expected[number] != digest for number, digest in stored)
+
+
+def _compare_rows(verdict: AxisCheck, name: str, expected: Counter[bytes], stored: Counter[bytes]) -> None:
+    counts = {name: expected, f"{name}_missing": expected - stored, f"{name}_unexpected": stored - expected}
+    for count, rows in counts.items():
+        setattr(verdict, count, getattr(verdict, count) + rows.total())
 
 
 def _digests(rows: pa.Table) -> Iterator[tuple[str, int, int, bytes]]:
@@ -229,7 +219,7 @@ def _digests(rows: pa.Table) -> Iterator[tuple[str, int, int, bytes]]:
 
 def _count(counts: dict[Run, Counter[bytes]], found: Iterable[tuple[str, int, bytes]]) -> None:
     for key, run, digest in found:
-        counts.setdefault((key, run), Counter())[digest] += 1
+        counts[key, run][digest] += 1
 
 
 def _fitted_digests(rows: pa.Table) -> Iterator[tuple[str, int, bytes]]:
@@ -323,7 +313,7 @@ async def replayed(log: FleetLog, key: str, axis: Axis, from_s: float) -> Replay
         output = stream.process(message.data, message.number, message.stored_s)
         if output.responses is not None:
             batches.append(_response_rows(key, stream.run, output.number, output.responses))
-        fits += [AxisFits(key, stream.run, output.fitted, one) for one in output.parameters]
+        fits += [AxisFits(key, stream.run, output.fitted, parameters) for parameters in output.parameters]
     if stream is None:
         raise FleetError(
             "no-data",

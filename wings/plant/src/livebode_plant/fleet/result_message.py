@@ -104,9 +104,9 @@ def digests(responses: Responses) -> NDArray[np.int64]:
     """A digest of all bits of each response, shape (rows,): stored rows are rounded, so it proves what was computed."""
     rows = len(responses)
     columns = [getattr(responses, name) for name in _BITS]
-    table = np.hstack([np.ascontiguousarray(one).view(np.uint8).reshape(rows, -1) for one in columns])
-    found = b"".join(blake2b(row, digest_size=_DIGEST_BYTES).digest() for row in table)
-    return np.frombuffer(found, np.int64)
+    table = np.hstack([np.ascontiguousarray(column).view(np.uint8).reshape(rows, -1) for column in columns])
+    content = b"".join(blake2b(row, digest_size=_DIGEST_BYTES).digest() for row in table)
+    return np.frombuffer(content, np.int64)
 
 
 def grid_of(responses: Responses) -> Mapping[str, Any]:
@@ -242,7 +242,7 @@ class PendingResults:
         self._events.append({"axis": key, **event})
 
     def message(self, through: int, owner: str) -> ResultMessage:
-        """All of them as one message."""
+        """One message of all outputs."""
         return ResultMessage(
             through,
             owner,
@@ -255,7 +255,7 @@ class PendingResults:
         )
 
     def _grids(self) -> dict[str, Mapping[str, Any]]:
-        found: dict[str, Mapping[str, Any]] = {}
+        grids: dict[str, Mapping[str, Any]] = {}
         for part in self._responses:
-            found |= dict.fromkeys(part.axes, grid_of(part.responses))
-        return found
+            grids |= dict.fromkeys(part.axes, grid_of(part.responses))
+        return grids

@@ -88,15 +88,15 @@ class ServerAccess:
 
     def _allowed(self, path: str) -> list[str]:
         """Subjects of the axes at or below a path; FleetError if there are none."""
-        found = [f"{EDGE}.{key}" for key in self.axes if f"{axis_path(key)}/".startswith(f"{path}/")]
-        if not found:
+        subjects = [f"{EDGE}.{key}" for key in self.axes if f"{axis_path(key)}/".startswith(f"{path}/")]
+        if not subjects:
             raise FleetError(
                 "axis-unknown",
                 f"the fleet has no axis {path!r} and none below it",
                 "correct the path in [users.edges], or add the axis to axes",
                 axis=path,
             )
-        return found
+        return subjects
 
 
 OPEN = ServerAccess(ServerSection(), UsersSection(), ())
@@ -134,10 +134,10 @@ def _account(path: str) -> str:
 
 
 def _users(keys: Iterable[str], leaves: Iterable[str] = ()) -> str:
-    found = [f"{{nkey: {key}}}" for key in keys]
+    users = [f"{{nkey: {key}}}" for key in keys]
     # A name without a password is enough only where a certificate proves it.
-    found += [f'{{user: {json.dumps(name)}, allowed_connection_types: ["LEAFNODE"]}}' for name in leaves]
-    return "    users: [ " + ", ".join(found) + " ]"
+    users += [f'{{user: {json.dumps(name)}, allowed_connection_types: ["LEAFNODE"]}}' for name in leaves]
+    return "    users: [ " + ", ".join(users) + " ]"
 
 
 def _service(subject: str, accounts: Sequence[str]) -> str:

@@ -24,9 +24,9 @@ from livebode.records import samples_of
 from livebode.sources.live import Batch
 from livebode.tables import from_numpy
 from livebode_plant.fleet.fleet_settings import SinkSection
-from livebode_plant.fleet.log import FleetLog, StoredMessage
+from livebode_plant.fleet.log import FleetLog
 from livebode_plant.fleet.message import read_message
-from livebode_plant.fleet.reader import Reader, stored_messages
+from livebode_plant.fleet.reader import Reader, StoredMessage, stored_messages
 from livebode_plant.fleet.sink_tables import SinkTables, SinkTotals
 from livebode_plant.fleet.subjects import (
     LOG,
@@ -119,7 +119,7 @@ class AlarmSamples:
         subject = f"{LOG}.*.{alarm.axis}"
         first = await self._log.first_since(LOG_STREAM, subject, alarm.logged_s - AROUND_S)
         stop = await self._log.first_since(LOG_STREAM, subject, alarm.logged_s + AROUND_S)
-        return [one async for one in stored_messages(self._log, LOG_STREAM, subject, stop - 1, first)]
+        return [message async for message in stored_messages(self._log, LOG_STREAM, subject, stop - 1, first)]
 
     def _saved(self, alarm: RaisedAlarm, messages: Sequence[StoredMessage]) -> list[dict[str, Any]]:
         """Write a file for each epoch of the sender, and return their rows."""
@@ -142,8 +142,8 @@ class AlarmSamples:
     def _note(self, alarm: RaisedAlarm, rows: Sequence[dict[str, Any]]) -> None:
         own = {"log": self._name, "kind": alarm.kind, "logged": _time(alarm.logged_s)}
         own |= dict(zip(LEVELS, axis_names(alarm.axis)))
-        found = [own | row for row in rows or [{"samples": 0}]]
-        self._lake.add_rows("fleet_samples", pa.Table.from_pylist(found, _SCHEMA))
+        noted = [own | row for row in rows or [{"samples": 0}]]
+        self._lake.add_rows("fleet_samples", pa.Table.from_pylist(noted, _SCHEMA))
 
 
 def _tuples(table: pa.Table) -> Iterator[tuple[Any, ...]]:

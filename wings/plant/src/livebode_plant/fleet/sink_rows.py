@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from livebode.core import LEVELS
 from livebode.tables import from_numpy, to_numpy
-from livebode_plant.fleet.log import StoredMessage
+from livebode_plant.fleet.reader import StoredMessage
 from livebode_plant.fleet.result_message import ResultMessage
 from livebode_plant.fleet.subjects import axis_names
 from livebode_plant.lake import TABLES
@@ -149,7 +149,8 @@ class _Results:
         own: dict[str, pa.Array[Any]] = {level: self._each(words) for level, words in zip(LEVELS, names)}
         own |= {"recipe": self._each(self._recipes), "log": pa.repeat(pa.scalar(log, pa.string()), len(self._codes))}
         own |= {"logged": logged, "day": logged.cast(pa.timestamp("us")).cast(pa.date32())}
-        columns = [(own[one.name] if one.name in own else self._rows[one.name]).cast(one.type) for one in schema]
+        every = {name: self._rows[name] for name in self._rows.column_names} | own
+        columns = [every[field.name].cast(field.type) for field in schema]
         return pa.table(columns, schema=schema)
 
     def parts(self) -> Iterator[RunPart]:

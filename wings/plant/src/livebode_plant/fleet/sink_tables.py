@@ -17,7 +17,7 @@ from livebode.core import LEVELS, ArchiveError, Responses, SignalError, counted
 from livebode.fitting import RunningMean
 from livebode.tables import Table
 from livebode_plant.fleet.fleet_settings import SinkSection
-from livebode_plant.fleet.log import StoredMessage
+from livebode_plant.fleet.reader import StoredMessage
 from livebode_plant.fleet.sink_rows import (
     DELETED,
     US,
@@ -123,7 +123,7 @@ class MeanTier:
         self._now_s = max(self._now_s, message.stored_s)
         self._begins.setdefault(int(self._now_s // self._period_s), message.number)
         ended = int((self._now_s - _LATE_S) // self._period_s) - 1
-        found = self._close(ended, log) if ended > self.closed else None
+        closed = self._close(ended, log) if ended > self.closed else None
         counted = self._now_s - _LATE_S < (self.closed + 1) * self._period_s
         for part in message.responses:
             for key, rows in self._periods(part, counted=counted):
@@ -132,7 +132,7 @@ class MeanTier:
         for part in message.parameters:
             for key, rows in self._periods(part, counted=counted):
                 self._parameters.setdefault(key, FittedQuantities()).add(Table.from_arrow(rows))
-        return found
+        return closed
 
     def _periods(self, part: RunPart, *, counted: bool) -> Iterator[tuple[PeriodKey, pa.Table]]:
         """The rows of each period; without those of periods that are closed, if they were `counted` there."""
@@ -175,12 +175,12 @@ class MeanTier:
         return run_place(*key.run, log) | dated("logged_from", key.period * self._period_s)
 
 
-def _invalid(one: Responses) -> Responses:
+def _invalid(newest: Responses) -> Responses:
     return replace(
-        one,
-        value=np.full_like(one.value, complex(np.nan, np.nan)),
-        sigma=np.full_like(one.sigma, np.nan),
-        valid=np.zeros_like(one.valid),
+        newest,
+        value=np.full_like(newest.value, complex(np.nan, np.nan)),
+        sigma=np.full_like(newest.sigma, np.nan),
+        valid=np.zeros_like(newest.valid),
     )
 
 
@@ -244,7 +244,8 @@ class SinkTables:
     def __init__(self, settings: SinkSection) -> None:
         self._settings = settings
         self.lake = Lake(settings.url)
-        self._waiting = {name: _WaitingRows(StreamTable(self.lake, name)) for name, one in TABLES.items() if one.days}
+        names = [name for name, table in TABLES.items() if table.days]
+        self._waiting = {name: _WaitingRows(StreamTable(self.lake, name)) for name in names}
         self.totals = SinkTotals()
 
     def resume(self, created_s: float) -> int:
@@ -279,7 +280,9 @@ class SinkTables:
 
     def process(self, messages: list[StoredMessage]) -> list[pa.Table]:
         """Add the next messages, and commit if it is time; returns the events that are new."""
-        events = [rows.tables["fleet_events"] for message in messages if (rows := self._take(message)) is not None]
+        events = [
+            rows.tables["fleet_events"] for message in messages if (rows := self._add_message(message)) is not None
+        ]
         full = sum(waiting.nbytes for waiting in self._waiting.values()) > _WAITING_BYTES_MAX
         if full or time.monotonic() >= self._due_s:
             self._due_s = time.monotonic() + self._settings.commit_s
@@ -288,7 +291,7 @@ class SinkTables:
                 self._clean_while_running()
         return events
 
-    def _take(self, message: StoredMessage) -> SinkRows | None:
+    def _add_message(self, message: StoredMessage) -> SinkRows | None:
         """Add a message; returns its rows if the lake does not have them."""
         if message.number > self._next:
             self._report_deleted(message)

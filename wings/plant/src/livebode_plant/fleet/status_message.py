@@ -130,7 +130,7 @@ class PartitionStatus:
 
     @property
     def axes(self) -> np.ndarray[Any, Any]:
-        """Its axes, `AXIS_STATUS`."""
+        """Axes of the message, `AXIS_STATUS`."""
         return np.frombuffer(self.body, AXIS_STATUS)
 
 
@@ -144,7 +144,7 @@ def encode_status(
 
 def encode_names(names: PartitionNames, at_s: float) -> tuple[bytes, int]:
     """The message of the names of a partition, and the number of their table."""
-    rows = [[one.path, one.parameter, one.unit, one.url] for one in names.axes]
+    rows = [[axis.path, axis.parameter, axis.unit, axis.url] for axis in names.axes]
     text = json.dumps({"worker": names.worker, "axes": rows, "kinds": names.kinds}, ensure_ascii=False)
     body = zlib.compress(text.encode())
     table = zlib.crc32(body)
@@ -186,13 +186,13 @@ def decode(message: bytes) -> PartitionStatus | PartitionNames:
 
 def usable(axes: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
     """Which rows of `AXIS_STATUS` have values within their ranges, shape (axes,)."""
-    found = axes["state"] < len(STATES)
-    found &= axes["priority"] < len(PRIORITIES)
-    found &= axes["flags"] <= _FLAGS
-    found &= (axes["lag_s"] >= 0) & (axes["lag_s"] < 1e9)
+    good = axes["state"] < len(STATES)
+    good &= axes["priority"] < len(PRIORITIES)
+    good &= axes["flags"] <= _FLAGS
+    good &= (axes["lag_s"] >= 0) & (axes["lag_s"] < 1e9)
     for name in ("effective_s", "value", "bound", "change_percent"):
-        found &= ~np.isinf(axes[name])
-    return np.asarray(found)
+        good &= ~np.isinf(axes[name])
+    return np.asarray(good)
 
 
 def _packed(
@@ -208,9 +208,9 @@ def _names(partition: int, table: int, count: int, body: bytes) -> PartitionName
         text = unpacking.decompress(body, _NAMES_BYTES_MAX)
         if not unpacking.eof:
             raise StatusError("names too long")
-        found = json.loads(text)
-        worker, kinds = _text(found["worker"]), tuple(map(_text, found["kinds"]))
-        axes = tuple(AxisName(*map(_text, row)) for row in found["axes"])
+        content = json.loads(text)
+        worker, kinds = _text(content["worker"]), tuple(map(_text, content["kinds"]))
+        axes = tuple(AxisName(*map(_text, row)) for row in content["axes"])
     except StatusError:
         raise
     except (zlib.error, ValueError, TypeError, KeyError, RecursionError):
@@ -272,7 +272,7 @@ class PageStatus:
         self, streams: Mapping[str, AxisStream], now_s: float, waiting: int, lag_s: float
     ) -> list[tuple[str, bytes]]:
         """Subjects and messages of this moment, seconds since 1970; `waiting` of the log's messages are `lag_s` old."""
-        found = []
+        messages = []
         for key, stream in streams.items():
             if key not in self._known:
                 self._known[key] = _Losses(AxisName(axis_path(key)), stream.lost)
@@ -287,11 +287,11 @@ class PageStatus:
             self._named_s = float("-inf")
         if self._names and now_s - self._named_s >= NAMES_EVERY_S:
             self._named_s = now_s
-            found.append((f"{NAMES}.{self._partition}", self._names))
+            messages.append((f"{NAMES}.{self._partition}", self._names))
         each = enumerate(self._known.items())
         rows = [_row(i, streams[key], losses, now_s, waiting > 0, lag_s) for i, (key, losses) in each]
         status = encode_status(self._partition, self._table, np.array(rows, AXIS_STATUS), now_s, waiting, lag_s)
-        return [*found, (f"{VIEW}.{self._partition}", status)] if self._names else found
+        return [*messages, (f"{VIEW}.{self._partition}", status)] if self._names else messages
 
 
 def _renamed(name: AxisName, main: MainQuantity) -> AxisName:

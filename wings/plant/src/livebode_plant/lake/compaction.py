@@ -46,15 +46,15 @@ def compact(lake: Lake) -> list[CompactionResult]:
         If a table cannot be read or written, or its directory has files that livebode did not write.
     """
     lake.check()
-    found = []
-    for name in [name for name, one in TABLES.items() if not one.days]:
+    results = []
+    for name in [name for name, table in TABLES.items() if not table.days]:
         try:
-            found.append(_compacted(lake, name))
+            results.append(_compacted(lake, name))
         except ArchiveError as error:
             if error.code != "archive.lake-damaged":
                 raise
             warnings.warn(str(error), DamageWarning, stacklevel=2)
-    return [one for one in found if one is not None]
+    return [table for table in results if table is not None]
 
 
 def _compacted(lake: Lake, name: str) -> CompactionResult | None:

@@ -178,14 +178,6 @@ def _column(rows: pa.Table, field: pa.Field[Any]) -> Any:
     return pa.nulls(rows.num_rows, field.type)
 
 
-def write_data_file(folder: Path, table: str, key: Key, parts: Iterable[pa.Table]) -> DataFile:
-    """Write the rows of one result, without the key's columns, to a file in this directory; none if it has no rows."""
-    with ResultFileWriter(folder, table, key) as writer:
-        for part in parts:
-            writer.write(part)
-        return writer.finish()
-
-
 def parquet_writer(path: Path | pa.BufferOutputStream, schema: pa.Schema) -> pq.ParquetWriter:
     """A Parquet file with the layout of wide responses, without Arrow's own schema: a lake has one for all files."""
     return pq.ParquetWriter(path, schema, store_schema=False, **wide_options(schema))
@@ -207,7 +199,7 @@ def small_files(files: Iterable[DataFile]) -> Iterator[list[DataFile]]:
     group: list[DataFile] = []
     small = (file for file in files if file.size_bytes < _SMALL_BYTES)
     for file in sorted(small, key=lambda file: (str(file.day), file.name)):
-        full = sum(one.size_bytes for one in group) + file.size_bytes > _JOINED_BYTES_MAX
+        full = sum(member.size_bytes for member in group) + file.size_bytes > _JOINED_BYTES_MAX
         if group and (full or file.day != group[0].day):
             yield from [group] * (len(group) > 1)
             group = []
@@ -266,16 +258,16 @@ class Snapshot:
         """
         try:
             actions = [json.loads(line) for line in commit.splitlines()]
-            entry = json.loads(next(one["commitInfo"] for one in actions if "commitInfo" in one)[_ENTRY])
+            entry = json.loads(next(action["commitInfo"] for action in actions if "commitInfo" in action)[_ENTRY])
             digest, streams = entry["digest"], [str(stream) for stream in entry["streams"]]
         except (KeyError, TypeError, ValueError, StopIteration, RecursionError):
             raise DamagedTableError(f"version {table.version()} has no digest") from None
         positions = {stream: table.transaction_version(stream) or 0 for stream in streams}
         files = {file.name: file for file in _files(name, table)}
-        found = cls(name, tuple(field.name for field in table.schema().fields), files, positions)
-        if found._digest != digest:
+        snapshot = cls(name, tuple(field.name for field in table.schema().fields), files, positions)
+        if snapshot._digest != digest:
             raise DamagedTableError(f"the digest in version {table.version()} is not that of its files")
-        return found
+        return snapshot
 
     def after(
         self, added: Iterable[DataFile], removed: Iterable[DataFile], positions: Mapping[str, int] | None = None
@@ -289,12 +281,12 @@ class Snapshot:
     def commit_properties(self, positions: Mapping[str, int] | None = None) -> CommitProperties:
         """Properties of the commit that leads to this, with these new positions."""
         entry = json.dumps({"digest": self._digest, "streams": sorted(self.positions)})
-        new = [Transaction(stream, at) for stream, at in (positions or {}).items()]
+        new = [Transaction(stream, position) for stream, position in (positions or {}).items()]
         return CommitProperties({_ENTRY: entry}, max_commit_retries=0, app_transactions=new)
 
     @property
     def _digest(self) -> str:
-        files = sorted((one.name, one.size_bytes, one.rows, str(one.day)) for one in self.files.values())
+        files = sorted((file.name, file.size_bytes, file.rows, str(file.day)) for file in self.files.values())
         content = [self.table, self.columns, files, sorted(self.positions.items())]
         return hashlib.sha256(json.dumps(content).encode()).hexdigest()
 
@@ -303,8 +295,8 @@ def _files(name: str, table: DeltaTable) -> list[DataFile]:
     actions = pa.table(table.get_add_actions(flatten=True))
     none: list[Any] = [None] * actions.num_rows
     columns = ("path", "size_bytes", "num_records", "partition.day")
-    values = [actions[one].to_pylist() if one in actions.column_names else none for one in columns]
-    files = [DataFile(name, *one) for one in zip(*values)]
+    values = [actions[column].to_pylist() if column in actions.column_names else none for column in columns]
+    files = [DataFile(name, *column) for column in zip(*values)]
     for file in files:
         try:
             file.of  # noqa: B018 - checks the name

@@ -326,12 +326,12 @@ class Lake(TableContent):
     def snapshot(self, name: str) -> Snapshot:
         """What a table that was opened consists of at its newest version."""
         table = self._tables[name]
-        version, found = self._snapshots.get(name, (-1, None))
-        if found is None or version != table.version():
+        version, snapshot = self._snapshots.get(name, (-1, None))
+        if snapshot is None or version != table.version():
             version = table.version()
-            found = Snapshot.read(name, table, read_bytes(self.place_of(name) / LOG / f"{version:020}.json"))
-            self._snapshots[name] = version, found
-        return found
+            snapshot = Snapshot.read(name, table, read_bytes(self.place_of(name) / LOG / f"{version:020}.json"))
+            self._snapshots[name] = version, snapshot
+        return snapshot
 
     def opened(self, name: str) -> DeltaTable | None:
         """The table at its newest version; None if it does not exist, or is advisory and its log is damaged."""

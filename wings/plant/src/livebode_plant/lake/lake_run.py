@@ -131,7 +131,7 @@ class LakeRun:
             yield from_wide(table.slice(start, _ROWS), self.summary["found"])
 
     def steady_batches(self) -> Iterator[Responses]:
-        """Those of a machine that was ready, without a transient at the start."""
+        """Batches of a machine that was ready, without a transient at the start."""
         return (steady(part, self.summary) for part in self.batches())
 
 

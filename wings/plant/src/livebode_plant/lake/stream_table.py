@@ -81,9 +81,9 @@ class StreamTable:
             If the table cannot be read.
         """
         with self._lake.reported(self.name):
-            found = (self._lake.file_rows(file, columns, where) for file in self._files(since=since))
+            parts = (self._lake.file_rows(file, columns, where) for file in self._files(since=since))
             return pa.concat_tables(
-                [self.schema.empty_table().select(columns), *(one for one in found if one is not None)]
+                [self.schema.empty_table().select(columns), *(part for part in parts if part is not None)]
             )
 
     def newest_first(self, columns: list[str], where: pc.Expression, since: date) -> Iterator[pa.Table]:
@@ -96,8 +96,8 @@ class StreamTable:
         """
         with self._lake.reported(self.name):
             for file in reversed(self._files(since=since)):
-                if (found := self._lake.file_rows(file, columns, where)) is not None:
-                    yield found
+                if (rows := self._lake.file_rows(file, columns, where)) is not None:
+                    yield rows
 
     def delete_before(self, day: date) -> int:
         """Remove the rows of earlier days, and return the number of their files."""

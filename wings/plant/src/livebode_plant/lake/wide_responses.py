@@ -158,10 +158,10 @@ def as_arrow(values: NDArray[Any], kind: pa.DataType, ends: pa.Array[Any] | None
 
 def as_numpy(table: pa.Table, field: pa.Field[Any], lines: Lines) -> NDArray[Any]:
     """A column, shape (rows,), or of lists, shape (rows, lines); RecordError if it is missing or has other lists."""
-    at = table.schema.get_field_index(field.name)
-    if at < 0:
+    index = table.schema.get_field_index(field.name)
+    if index < 0:
         raise unexpected_rows(f"has no column {field.name!r}")
-    array = table.column(at).combine_chunks()
+    array = table.column(index).combine_chunks()
     if pa.types.is_fixed_size_list(field.type):
         if not len(array):
             return np.empty((0, len(lines)), dtype=field.type.value_type.to_pandas_dtype())
@@ -274,8 +274,8 @@ def matrices_from_wide(entries: pa.Table, covariance: pa.Table, summary: Mapping
     tables = {(o, i): _where(entries, output=o, input=i) for o in outputs for i in inputs}
     each = {of: from_wide(table, entry_summary(summary, *of)["found"]) for of, table in tables.items()}
     first = each[outputs[0], inputs[0]]
-    for one in each.values():
-        _check_rows(one.sample, first.sample)
+    for responses in each.values():
+        _check_rows(responses.sample, first.sample)
     at_input = [tables[outputs[0], i] for i in inputs]
     return MatrixResponses(
         lines,
@@ -300,13 +300,13 @@ def _factor(
 ) -> NDArray[np.complex128]:
     """A factor of the covariance of the matrices with these samples, shape (rows, lines, names, names)."""
     schema = covariance_schema(len(lines))
-    found = np.empty((len(sample), len(lines), len(names), len(names)), dtype=np.complex128)
+    factors = np.empty((len(sample), len(lines), len(names), len(names)), dtype=np.complex128)
     for m, n in np.ndindex(len(names), len(names)):
         own = _where(covariance, factor=factor, row=names[m], column=names[n])
         _check_rows(as_numpy(own, schema.field("sample"), lines), sample)
-        found[:, :, m, n].real = as_numpy(own, schema.field("re"), lines)
-        found[:, :, m, n].imag = as_numpy(own, schema.field("im"), lines)
-    return found
+        factors[:, :, m, n].real = as_numpy(own, schema.field("re"), lines)
+        factors[:, :, m, n].imag = as_numpy(own, schema.field("im"), lines)
+    return factors
 
 
 def _check_rows(own: NDArray[np.int64], expected: NDArray[np.int64]) -> None:

@@ -63,10 +63,10 @@ class FleetAct:
         try:
             if len(data) > ACT_BYTES_MAX:
                 return None
-            found = cls(**json.loads(data))
+            act = cls(**json.loads(data))
         except (ValueError, TypeError, RecursionError):
             return None
-        return found if found._valid() else None
+        return act if act._valid() else None
 
     def _valid(self) -> bool:
         texts = ((self.path, ACT_BYTES_MAX), (self.by, NAME_MAX), (self.words, TEXT_MAX))
@@ -112,10 +112,10 @@ class FleetAlarms:
         of_response = np.array([kind in ALARMS and ALARMS[kind].of_response for kind in kinds])[status["kind"]]
         # An axis that begins again counts from zero: its next alarm must not pass for an acknowledged one.
         new = (self._seen[: len(status)] < raised) | ((self._seen_s[: len(status)] < status["raised_s"]) & (raised > 0))
-        found = np.where(new, np.where(active, UNACKNOWLEDGED, RETURNED), np.where(active, ACKNOWLEDGED, NORMAL))
-        found[active & of_response & ((status["flags"] & NOT_READY) > 0)] = SUPPRESSED
-        found[(found != NORMAL) & (self._until_s[: len(status)] > now_s)] = SHELVED
-        return found.astype(np.uint8)
+        conditions = np.where(new, np.where(active, UNACKNOWLEDGED, RETURNED), np.where(active, ACKNOWLEDGED, NORMAL))
+        conditions[active & of_response & ((status["flags"] & NOT_READY) > 0)] = SUPPRESSED
+        conditions[(conditions != NORMAL) & (self._until_s[: len(status)] > now_s)] = SHELVED
+        return conditions.astype(np.uint8)
 
     def plain(self, row: int, now_s: float) -> dict[str, Any]:
         """Who acknowledged the alarm of a row, and its shelf, for the page."""
@@ -191,17 +191,17 @@ class FleetBoard:
     def refresh(self, now_s: float) -> None:
         """Compute the looks of this moment."""
         status = self.axes.status
-        self._conditions = found = self.alarms.conditions(status, self.axes.kinds, now_s)
+        self._conditions = conditions = self.alarms.conditions(status, self.axes.kinds, now_s)
         flags = status["flags"]
         looks = status["state"].copy()
         for which, look in (
             ((flags & NOT_READY) > 0, NOT_READY_LOOK),
-            (found == SHELVED, SHELVED_LOOK),
-            (found == ACKNOWLEDGED, ACKNOWLEDGED_LOOK),
+            (conditions == SHELVED, SHELVED_LOOK),
+            (conditions == ACKNOWLEDGED, ACKNOWLEDGED_LOOK),
             ((flags & BEHIND) > 0, BEHIND_LOOK),
             ((flags & SILENT) > 0, SILENT_LOOK),
-            (found == RETURNED, RETURNED_LOOK),
-            (found == UNACKNOWLEDGED, ALARM),
+            (conditions == RETURNED, RETURNED_LOOK),
+            (conditions == UNACKNOWLEDGED, ALARM),
         ):
             looks[which] = look
         lost = [n for n, partition in self.axes.partitions.items() if not now_s - partition.heard_s < LOST_S]
@@ -224,8 +224,8 @@ class FleetBoard:
         score = 1e6 * _SEVERITY[self._looks] + 1e5 * status["priority"]
         score += np.minimum(np.nan_to_num(np.abs(status["change_percent"])), 1e4)
         score += 1e-5 * np.minimum(status["lag_s"], 1e4)
-        found = _largest(score, WORST)
-        return [self._plain(int(row)) for row in found if _SEVERITY[self._looks[row]] > 1]
+        rows = _largest(score, WORST)
+        return [self._plain(int(row)) for row in rows if _SEVERITY[self._looks[row]] > 1]
 
     def open_alarms(self, now_s: float) -> dict[str, Any]:
         """Alarms that are not normal, the most urgent first, at most 300, and how many there are."""
@@ -240,14 +240,14 @@ class FleetBoard:
     @property
     def open_count(self) -> int:
         """Number of alarms that are not acknowledged."""
-        found = self._conditions
-        return int(np.count_nonzero((found == UNACKNOWLEDGED) | (found == RETURNED)))
+        conditions = self._conditions
+        return int(np.count_nonzero((conditions == UNACKNOWLEDGED) | (conditions == RETURNED)))
 
     def gaps(self) -> dict[str, Any]:
         """The 50 axes that lost most samples, and the sums of the fleet."""
         status = self.axes.status
-        found = _largest(status["lost"].astype(float) + 1e-3 * np.minimum(status["gaps"], 100), WORST)
-        rows = [self._plain(int(row)) for row in found if status["gaps"][row] or status["lost"][row]]
+        worst = _largest(status["lost"].astype(float) + 1e-3 * np.minimum(status["gaps"], 100), WORST)
+        rows = [self._plain(int(row)) for row in worst if status["gaps"][row] or status["lost"][row]]
         return {
             "rows": rows,
             "axes": int(np.count_nonzero(status["gaps"])),
@@ -257,7 +257,7 @@ class FleetBoard:
 
     def workers(self, now_s: float) -> dict[str, Any]:
         """Each worker with the sums and the worst of its partitions, the latest first; and partitions without one."""
-        found: dict[str, dict[str, Any]] = {}
+        workers: dict[str, dict[str, Any]] = {}
         silent: list[dict[str, Any]] = []
         for number, partition in sorted(self.axes.partitions.items()):
             age_s = now_s - partition.heard_s
@@ -266,19 +266,19 @@ class FleetBoard:
                 silent.append({"partition": number, "axes": len(partition.rows), "age_s": _number(age_s)})
                 continue
             name = "" if names is None else names.worker
-            one = found.setdefault(
+            worker = workers.setdefault(
                 name, {"worker": name, "partitions": 0, "axes": 0, "waiting": 0, "lag_s": 0.0, "age_s": 0.0}
             )
-            one["partitions"] += 1
-            one["axes"] += len(partition.rows)
-            one["waiting"] += partition.waiting
-            one["lag_s"] = max(one["lag_s"], _number(partition.lag_s))
-            one["age_s"] = max(one["age_s"], _number(age_s))
-        rows = sorted(found.values(), key=lambda one: (-one["lag_s"], -one["waiting"], one["worker"]))
+            worker["partitions"] += 1
+            worker["axes"] += len(partition.rows)
+            worker["waiting"] += partition.waiting
+            worker["lag_s"] = max(worker["lag_s"], _number(partition.lag_s))
+            worker["age_s"] = max(worker["age_s"], _number(age_s))
+        rows = sorted(workers.values(), key=lambda worker: (-worker["lag_s"], -worker["waiting"], worker["worker"]))
         return {
             "rows": rows[:PARTITIONS_MAX], "count": len(rows), "partitions": len(self.axes.partitions),
             "silent": silent[:PARTITIONS_MAX], "silent_count": len(silent),
-            "waiting": sum(one["waiting"] for one in rows), "dropped": self.axes.dropped,
+            "waiting": sum(worker["waiting"] for worker in rows), "dropped": self.axes.dropped,
         }  # fmt: skip
 
     def axis(self, number: int, now_s: float) -> dict[str, Any] | None:
@@ -320,9 +320,9 @@ class FleetBoard:
     def _plain(self, row: int) -> dict[str, Any]:
         status = self.axes.status[row]
         numbers = ("effective_s", "lag_s", "value", "bound", "change_percent")
-        found: dict[str, Any] = {name: _number(float(status[name])) for name in numbers}
-        found |= {name: int(status[name]) for name in ("lost", "gaps", "raised", "raised_s")}
-        return found | {
+        plain: dict[str, Any] = {name: _number(float(status[name])) for name in numbers}
+        plain |= {name: int(status[name]) for name in ("lost", "gaps", "raised", "raised_s")}
+        return plain | {
             "axis": int(self.axes.place[row]),
             "look": int(self._looks[row]),
             "parameter": self.axes.names[row].parameter,
@@ -339,7 +339,7 @@ def _largest(score: Array, count: int) -> Array:
 
 
 def _number(value: float) -> float | None:
-    """For JSON, with the digits that a person reads."""
+    """A number for JSON, with the digits that a person reads."""
     if not isfinite(value):
         return None
     return round(value, 3) if abs(value) > 1e6 else float(f"{value:.6g}")

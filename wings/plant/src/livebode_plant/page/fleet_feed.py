@@ -151,9 +151,9 @@ class NatsFeed:
             try:
                 if (await js.stream_info(ACTS_STREAM)).state.last_seq < number:
                     raise NotFoundError
-                found = await js.get_msg(ACTS_STREAM, number, subject=f"{ACTS}.>", next=True)
-                hear_act(found.data or b"")
-                number, pause_s = found.seq + 1, 0.0
+                message = await js.get_msg(ACTS_STREAM, number, subject=f"{ACTS}.>", next=True)
+                hear_act(message.data or b"")
+                number, pause_s = message.seq + 1, 0.0
             except NotFoundError:  # none yet
                 pause_s = _POLL_S
             except (TimeoutError, self._errors) as error:
@@ -215,17 +215,20 @@ def demo_paths(axes: int) -> list[str]:
     """Paths of simulated axes: six axes a machine, some ten machines a line."""
     machines = -(-axes // len(_LETTERS))
     lines = max(1, min(len(_LINES) * len(_SITES), machines // 8))
-    found = []
+    paths = []
     for machine in range(machines):
         line = machine % lines
         site, name = _SITES[line % len(_SITES)], _LINES[line // len(_SITES) % len(_LINES)]
         kind = _MACHINES[machine // lines % len(_MACHINES)]
-        found += [f"{site}/{name}/{kind} {machine // lines + 1}/{letter}" for letter in _LETTERS]
-    return found[:axes]
+        paths += [f"{site}/{name}/{kind} {machine // lines + 1}/{letter}" for letter in _LETTERS]
+    return paths[:axes]
 
 
 class DemoFleet:
-    """The truth: arrays of one value for each axis, in the order of `paths`.
+    """The truth of a simulated fleet, to try the page without machines: axes that age, fall silent and lose samples.
+
+    Arrays have one value for each axis, in the order of `paths`. Everything follows from the seed and the time since
+    the start, so that a test knows the truth.
 
     Parameters
     ----------
@@ -336,13 +339,13 @@ class DemoFeed:
     def messages(self, tables: dict[int, int], now_s: float) -> list[bytes]:
         """The status of each partition at this moment."""
         status = self.fleet.status(now_s - self.began_s, now_s)
-        found = []
+        messages = []
         for partition, table in tables.items():
             axes = status[self.fleet.part(partition)]
             lag_s = float(np.max(axes["lag_s"][(axes["flags"] & SILENT) == 0], initial=0.0))
             if partition not in self._silent:
-                found.append(encode_status(partition, table, axes, now_s, waiting=int(40 * lag_s), lag_s=lag_s))
-        return found
+                messages.append(encode_status(partition, table, axes, now_s, waiting=int(40 * lag_s), lag_s=lag_s))
+        return messages
 
     async def publish(self, act: FleetAct) -> None:
         """Send it back."""

@@ -274,7 +274,7 @@ class FleetPages:
 
     @property
     def routes(self) -> list[BaseRoute]:
-        """All of them."""
+        """Routes of the page."""
         answers = {"axes": self.axes, "plan": self.plan, "trend": self.trend}
         return [
             Route("/", self.page),

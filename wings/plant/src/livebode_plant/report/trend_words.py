@@ -119,24 +119,24 @@ def years_figure(years: Sequence[Year], *, width_in: float = 9.0, dark: bool = F
 
 def _panel(axes: Axes, look: Style, year: Year, label: str, dates: int = 8) -> None:
     low, high = _limits(year)
-    at = _dates(year.time_s)
+    days = _dates(year.time_s)
     _gaps(axes, look, year.time_s)
     inside = (year.value >= low) & (year.value <= high)
     for shown, colour in ((year.counted & inside, look.run), (~year.counted & inside, look.muted)):
         known = shown & np.isfinite(year.bound)
         axes.vlines(
-            at[known], (year.value - year.bound)[known], (year.value + year.bound)[known],
+            days[known], (year.value - year.bound)[known], (year.value + year.bound)[known],
             color=colour, alpha=0.3, linewidth=1.1, gid="bound",
         )  # fmt: skip
-        axes.plot(at[shown], year.value[shown], ".", markersize=4.5, color=colour, gid="run")
+        axes.plot(days[shown], year.value[shown], ".", markersize=4.5, color=colour, gid="run")
     for beyond, edge, mark in ((year.value < low, low, "v"), (year.value > high, high, "^")):
-        axes.plot(at[beyond], np.full(int(beyond.sum()), edge), mark, markersize=4, color=look.muted, clip_on=False)
-    edges = [0, *(int(np.searchsorted(year.time_s, t)) for t in year.jumps), len(at)]
+        axes.plot(days[beyond], np.full(int(beyond.sum()), edge), mark, markersize=4, color=look.muted, clip_on=False)
+    edges = [0, *(int(np.searchsorted(year.time_s, t)) for t in year.jumps), len(days)]
     for first, stop in pairwise(edges):
         part = slice(first, stop)
         band = (year.line - year.line_bound)[part], (year.line + year.line_bound)[part]
-        axes.fill_between(at[part], *band, color=look.newest, alpha=0.25, linewidth=0, gid="band")
-        axes.plot(at[part], year.line[part], color=look.newest, linewidth=1.7, gid="trend")
+        axes.fill_between(days[part], *band, color=look.newest, alpha=0.25, linewidth=0, gid="band")
+        axes.plot(days[part], year.line[part], color=look.newest, linewidth=1.7, gid="trend")
     for time_s, _ in year.changes:
         axes.axvline(_dates(np.array([time_s]))[0], color=look.ink, linewidth=0.9, dashes=(4, 3), gid="change")
     axes.set_ylim(low, high)
@@ -157,9 +157,9 @@ def _limits(year: Year) -> tuple[float, float]:
 
 def _gaps(axes: Axes, look: Style, time_s: Floats) -> None:
     """Shade spans of four weeks and more without a run."""
-    at = _dates(time_s)
+    dates = _dates(time_s)
     for i in np.flatnonzero(np.diff(time_s) > _GAP_S):
-        axes.axvspan(at[i], at[i + 1], color=look.nothing, alpha=0.6, linewidth=0, gid="gap")
+        axes.axvspan(dates[i], dates[i + 1], color=look.nothing, alpha=0.6, linewidth=0, gid="gap")
 
 
 def _name_changes(axes: Axes, look: Style, year: Year) -> None:

@@ -108,33 +108,33 @@ class Assessment:
     silent: Mapping[str, float]
 
 
-def assess(found: Sequence[History], limit_percent: float = LIMIT_PERCENT) -> list[Assessment]:
+def assess(histories: Sequence[History], limit_percent: float = LIMIT_PERCENT) -> list[Assessment]:
     """Trends of one or several quantities, with the false discoveries of all together limited.
 
     Parameters
     ----------
-    found
+    histories
         The quantities.
     limit_percent
         Change that needs maintenance; see `ranking`.
     """
     trends: list[tuple[int, str, Trend]] = []
-    refused: list[dict[str, str]] = [{} for _ in found]
-    for number, one in enumerate(found):
-        for machine, runs in one.machines.items():
+    refused: list[dict[str, str]] = [{} for _ in histories]
+    for number, history in enumerate(histories):
+        for machine, runs in history.machines.items():
             trend = runs.trend()
             if isinstance(trend, NotAssessed):
                 refused[number][machine] = trend.reason
             else:
                 trends.append((number, machine, trend))
     significant = discoveries([trend.p for *_, trend in trends])
-    ranked: list[list[Ranked]] = [[] for _ in found]
+    ranked: list[list[Ranked]] = [[] for _ in histories]
     for (number, machine, trend), own in zip(trends, significant):
-        months = months_to_limit(trend, limit_percent, found[number].unit_of(machine))
+        months = months_to_limit(trend, limit_percent, histories[number].unit_of(machine))
         ranked[number].append(Ranked(machine, trend, own, months))
     return [
-        Assessment(one, tuple(sorted(ranked[number], key=urgency)), refused[number], silent_since(one))
-        for number, one in enumerate(found)
+        Assessment(history, tuple(sorted(ranked[number], key=urgency)), refused[number], silent_since(history))
+        for number, history in enumerate(histories)
     ]
 
 
@@ -189,13 +189,13 @@ def differences(
     The levels are compared by the regression of `robust_fit`, with the covariates that both sides have. A trend within
     a side is part of its scatter, so that the bound is then wide.
     """
-    found = [(history, _regressed(one, other)) for history, one, other in pairs]
-    few = [history.name for history, one in found if one is None]
-    known = [(history, one) for history, one in found if one is not None]
-    significant = discoveries([one[4] for _, one in known])
+    compared = [(history, _regressed(first, second)) for history, first, second in pairs]
+    few = [history.name for history, fit in compared if fit is None]
+    known = [(history, fit) for history, fit in compared if fit is not None]
+    significant = discoveries([fit[4] for _, fit in known])
     return [
-        LevelDifference(history.model, history.name, history.unit, *one[:5], own, one[5])
-        for (history, one), own in zip(known, significant)
+        LevelDifference(history.model, history.name, history.unit, *fit[:5], own, fit[5])
+        for (history, fit), own in zip(known, significant)
     ], few
 
 

@@ -57,15 +57,15 @@ def _compact(archive: str, *, as_json: bool) -> None:
     from livebode_plant.archive.archive_settings import lake_url
     from livebode_plant.lake import Lake, compact
 
-    found = compact(Lake(lake_url(archive)))
+    results = compact(Lake(lake_url(archive)))
     if as_json:
-        print(to_json({"tables": [vars(one) for one in found]}))
+        print(to_json({"tables": [vars(result) for result in results]}))
         return
-    for one in found:
-        print(f"{one.table}: {one.before:,} files, now {one.after:,}; {one.removed:,} old ones removed")
-        if one.open_results:
-            remark = f"{one.open_results:,} results are not complete: let the archive run to its end first"
-            print(f"livebode: {one.table}: files not joined; {remark}", file=sys.stderr)
+    for result in results:
+        print(f"{result.table}: {result.before:,} files, now {result.after:,}; {result.removed:,} old ones removed")
+        if result.open_results:
+            remark = f"{result.open_results:,} results are not complete: let the archive run to its end first"
+            print(f"livebode: {result.table}: files not joined; {remark}", file=sys.stderr)
 
 
 _SHOWN = 10
@@ -130,7 +130,7 @@ def _show(outcome: ArchiveOutcome, lake: str, archive: str, seconds: float, *, a
     from livebode.records import to_json
 
     if as_json:
-        bad = {name: [_plain(one) for one in getattr(outcome, name)] for name in ("quarantined", "unreadable")}
+        bad = {name: [_plain(failure) for failure in getattr(outcome, name)] for name in ("quarantined", "unreadable")}
         numbers = ("recordings", "known", "tracked", "stopped", "remaining")
         print(to_json({"lake": lake} | {name: getattr(outcome, name) for name in numbers} | bad))
         return
@@ -138,8 +138,8 @@ def _show(outcome: ArchiveOutcome, lake: str, archive: str, seconds: float, *, a
     parts += [f"{len(outcome.quarantined):,} to quarantine"] if outcome.quarantined else []
     parts += [f"{len(outcome.unreadable):,} not readable"] if outcome.unreadable else []
     print(f"{', '.join(parts)} in {seconds:.1f} s\n{lake}")
-    for one in [*outcome.quarantined, *outcome.unreadable][:_SHOWN]:
-        print(f"livebode: {_url(one)}: {one.sentence}", file=sys.stderr)
+    for failure in [*outcome.quarantined, *outcome.unreadable][:_SHOWN]:
+        print(f"livebode: {_url(failure)}: {failure.sentence}", file=sys.stderr)
     if len(outcome.quarantined) > _SHOWN:
         print(f"livebode: all of them: livebode archive list {archive} --quarantined", file=sys.stderr)
     if outcome.stopped:
@@ -147,9 +147,9 @@ def _show(outcome: ArchiveOutcome, lake: str, archive: str, seconds: float, *, a
         print(f"livebode: stopped; {left}the same command continues", file=sys.stderr)
 
 
-def _url(one: TrackingFailure) -> str:
-    return str(one.place.url)
+def _url(failure: TrackingFailure) -> str:
+    return str(failure.place.url)
 
 
-def _plain(one: TrackingFailure) -> dict[str, str]:
-    return {"url": _url(one), "code": one.code, "sentence": one.sentence}
+def _plain(failure: TrackingFailure) -> dict[str, str]:
+    return {"url": _url(failure), "code": failure.code, "sentence": failure.sentence}

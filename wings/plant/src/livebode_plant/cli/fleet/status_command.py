@@ -73,26 +73,26 @@ def _print_status(fleet: Path, *, as_json: bool) -> None:
         _show(status)
 
 
-def _show(found: dict[str, Any]) -> None:
+def _show(status: dict[str, Any]) -> None:
     from rich.table import Table
 
     table = Table("partition", "owner", "behind", "axes", box=None, pad_edge=False)
-    for one in found["partitions"]:
-        held = sum(axis["partition"] == one["partition"] for axis in found["axes"])
+    for one in status["partitions"]:
+        held = sum(axis["partition"] == one["partition"] for axis in status["axes"])
         table.add_row(str(one["partition"]), one["owner"], f"{one['lag_s']:.1f} s", str(held))
     console(markup=False).print(table)
-    log = found["log"]
+    log = status["log"]
     print(
         f"\nlog: {log['messages']:,} messages, {log['bytes'] / 1e6:,.0f} MB, {log['full_share']:.1%} of its limit; "
         f"{log['waiting']:,} not processed yet"
     )
-    print(f"axes: {len(found['axes'])} with data, {len(found['without_data'])} without")
-    for one in found["sinks"]:
+    print(f"axes: {len(status['axes'])} with data, {len(status['without_data'])} without")
+    for one in status["sinks"]:
         print(f"sink of {one['lake']}: {one['behind']:,} messages of results behind, {one['behind_s']:,.0f} s")
-    for alarm in found["alarms"][:_SHOWN]:
+    for alarm in status["alarms"][:_SHOWN]:
         print(f"alarm: {alarm}")
-    if len(found["alarms"]) > _SHOWN:
-        print(f"and {len(found['alarms']) - _SHOWN} more alarms")
+    if len(status["alarms"]) > _SHOWN:
+        print(f"and {len(status['alarms']) - _SHOWN} more alarms")
 
 
 def serve_page(
