@@ -19,13 +19,12 @@ _BELONGS = {MATRIX: "a list of channels in [signals]", "output_only": "the secti
 
 ESTIMATES: Mapping[str, Mapping[str, str]] = {
     RESPONSE: {
-        "check": "livebode.configuration.matrix:check_no_matrix",
         "baseline": "livebode.monitoring:Baseline",
         "estimate": "livebode.runtime.single_response:SingleResponse",
-        "recording": "livebode.runtime.recordings:examined_recordings",
-        "draw": "livebode.cli.pictures:drawing_of",
+        "recording": "livebode.runtime.recording:examined_recordings",
+        "draw": "livebode.cli.pictures:draw_response",
         "show": "livebode.cli.pictures:show",
-        "page": "livebode.dashboard.matrix_view:views_of_response",
+        "page": "livebode.dashboard.run_feed:views_of_response",
         "export": "livebode.cli.export_command:responses",
     },
 }

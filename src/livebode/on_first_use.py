@@ -5,10 +5,9 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable
 from importlib import import_module
-from typing import Any
 
 
-def on_first_use(package: str, file: str) -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:
+def on_first_use(package: str, file: str) -> tuple[Callable[[str], object], Callable[[], list[str]], list[str]]:
     """The `__getattr__`, `__dir__` and `__all__` of a package whose names its `__init__.pyi` imports.
 
     The stub is the only list of the names: a type checker reads it too. Each is there as `name as name`, which is how a
@@ -23,11 +22,11 @@ def on_first_use(package: str, file: str) -> tuple[Callable[[str], Any], Callabl
                 home, words = words[1], words[3:]
             homes |= {shown: (home, name) for name, shown in zip(words[::3], words[2::3], strict=False)}
 
-    def attribute(name: str) -> Any:
+    def attribute(name: str) -> object:
         if name not in homes:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
         home, own = homes[name]
-        value = getattr(import_module(home), own)
+        value: object = getattr(import_module(home), own)
         setattr(sys.modules[package], name, value)
         return value
 

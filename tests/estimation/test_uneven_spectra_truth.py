@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from livebode import Block, Lines, Responses, Settings, SignalError, Tracker, multisine
 from livebode.estimation import UnevenSpectra, UnevenTracker
 from livebode.preparation import UnevenSource
-from livebode.sources import open_uneven
+from livebode.sources import open_file, uneven_log_of
 from tests.support.errors import refused
 from tests.support.uneven import write_mdf
 
@@ -22,7 +22,7 @@ LINES = Lines.parse("10:80:10", RATE_HZ, WINDOW)
 
 def log_of(folder, channels):
     """A log of these channels, at their times, on a grid of 1 kHz from the first time of w on."""
-    return open_uneven(write_mdf(folder / "log.mf4", channels), list(channels), rate_hz=RATE_HZ)
+    return uneven_log_of(open_file(write_mdf(folder / "log.mf4", channels)), list(channels), rate_hz=RATE_HZ)
 
 
 def responses_of(log, schedule=None, drifting=(), lines=LINES, **options):

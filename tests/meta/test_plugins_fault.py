@@ -8,14 +8,17 @@ import sys
 from collections.abc import Sequence
 from importlib.metadata import entry_points
 from pathlib import Path
+from urllib.parse import urljoin
 
 import numpy as np
 import pytest
+from playwright.sync_api import Browser
 
 from livebode import plugins
 from livebode_drives.formats import FORMATS
 from tests.support import recordings
 from tests.support.answers import Answer, answers
+from tests.support.browser import Tab
 from tests.support.command import signals, write_parquet
 
 BROKEN = {
@@ -153,7 +156,9 @@ def test_a_wing_that_was_left_out_is_no_fault(tmp_path: Path) -> None:
     assert "cannot be loaded" not in done.err
 
 
-def test_without_the_wing_control_a_run_has_its_report_and_the_page_the_reason(log: Path, tmp_path: Path) -> None:
+def test_without_the_wing_control_a_run_has_its_report_and_its_page(
+    log: Path, tmp_path: Path, browser: Browser
+) -> None:
     run, report, tune, tested = without(
         "control",
         ["run", log, *RUN, "--out", tmp_path / "run"],
@@ -166,14 +171,27 @@ def test_without_the_wing_control_a_run_has_its_report_and_the_page_the_reason(l
     assert "No such command 'tune'" in tune.err
     assert (tested.code, tested.err.count("\n")) == (2, 1)
     assert "a model is tested by the wing control, which is not installed; install the wing control" in tested.err
-    code = """
+    serve = """
 import sys
-sys.modules["livebode_control"] = None
-from livebode.dashboard.trials import loop_trials
-print(loop_trials().facts())
+sys.modules["livebode_control"] = sys.modules["livebode_matrix"] = None
+from pathlib import Path
+from livebode.dashboard import Dashboard, ServerSettings
+dashboard = Dashboard(ServerSettings("127.0.0.1", 0))
+dashboard.view(Path(sys.argv[1]))
+with dashboard:
+    print(dashboard.url, flush=True)
+    sys.stdin.read()
 """
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    assert "the wing control is not installed" in done.stdout
+    command = [sys.executable, "-c", serve, str(tmp_path / "run")]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as server:
+        assert server.stdout is not None
+        with Tab(browser, server.stdout.readline().strip()) as tab:
+            tab.until("bode.drawn.measured")
+            assert tab.page.locator("#bode-curves").count() == 1
+            assert tab.page.locator("[id*=what-if], [id*=matrix]").count() == 0
+            assert tab.page.request.get(urljoin(tab.page.url, "/api/loop?axis=0")).status == 404
+            assert tab.wrong == []
+        server.communicate()
 
 
 def test_recordings_of_a_wing_that_was_left_out_are_refused(tmp_path: Path) -> None:

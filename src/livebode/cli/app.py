@@ -20,10 +20,8 @@ from typing import Any, cast
 import typer
 from typer.core import TyperCommand, TyperGroup
 
-from livebode.cli.command_help import error_page, help_page
-from livebode.cli.commands import Command
+from livebode.cli.commands import ABOUT, OPTIONS, Command
 from livebode.cli.failures import disk_full, failure_of, json_requested, name_options, unparsed
-from livebode.cli.first_page import ABOUT, OPTIONS
 from livebode.cli.log_options import File, Level, LogOptions, logged
 from livebode.cli.remote import with_copies
 from livebode.cli.terminal import print_page, protect
@@ -48,6 +46,8 @@ class _Light:
 
     def format_help(self, ctx: Any, formatter: Any) -> None:  # noqa: ARG002
         """Print the help."""
+        from livebode.cli.command_help import help_page
+
         print_page(lambda width, colours: help_page(self, ctx, width, colours=colours))
 
 
@@ -198,6 +198,8 @@ def run_application() -> None:
 
 def _show_usage_error(error: typer.TyperException) -> None:
     if error.format_message():  # none where the help was printed instead
+        from livebode.cli.command_help import error_page
+
         print_page(lambda width, colours: error_page(error, width, colours=colours), stderr=True)
 
 

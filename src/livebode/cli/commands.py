@@ -15,6 +15,18 @@ PANELS = (MEASURE, RESULTS, COMPARE, CONTROL, MANY)
 """Titles under which the help lists the commands, in its order; a plug-in may have another one."""
 
 
+ABOUT = "The Bode plot of a machine while the machine works."
+OPTIONS: Mapping[str, str] = {
+    "--version": "Print the version and exit.",
+    "--log-level LEVEL": "Write a log from this level on: debug, info, warning or error. [default: info with "
+    "--log-file]",
+    "--log-file FILE": "Write the log there instead of on standard error.",
+    "--install-completion": "Install completion for the current shell.",
+    "--show-completion": "Show completion for the current shell, to copy it or customize the installation.",
+    "--help -h": "Show this message and exit.",
+}
+
+
 class Command(NamedTuple):
     """A command, or a group of them.
 

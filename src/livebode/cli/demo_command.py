@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from contextlib import nullcontext
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -35,7 +36,7 @@ def demo_command(
     """Track a simulated belt axis during its strokes, live; halfway, the belt loses 10 % of its stiffness."""
     from rich.progress import BarColumn, Progress, TextColumn
 
-    from livebode.cli.pictures import drawing, show
+    from livebode.cli.pictures import draw_titled, show
     from livebode.cli.serving import served
     from livebode.configuration import ServeSection
     from livebode.core import Responses
@@ -62,9 +63,8 @@ def demo_command(
     columns = (TextColumn("{task.completed:.1f} s"), BarColumn(10), TextColumn("{task.description}"))
     # A first user sees the page without asking for it, on any free port, so that the default port stays free.
     shown = serve or (not fast and find_spec("uvicorn") is not None)
-    with served(
-        shown, ServeSection() if serve else ServeSection(port=0), port, {"demo": ()}, stays=serve
-    ) as subscribers_of:
+    section = ServeSection() if serve else ServeSection(port=0)
+    with served(section, port, {"demo": ()}, stays=serve) if shown else nullcontext(lambda _: ()) as subscribers_of:
         with Progress(*columns, console=console, transient=True, disable=as_json or not console.is_terminal) as bar:
             task = bar.add_task("", total=seconds)
 
@@ -75,7 +75,7 @@ def demo_command(
                     total = document.samples_total or document.samples
                     bar.update(task, completed=seconds * document.samples / total)
 
-            draw = drawing("simulated belt axis", ("u", "velocity"))
+            draw = partial(draw_titled, title="simulated belt axis", names=("u", "velocity"))
             to = Destination(out, draw, force=True, subscribers=(*subscribers_of("demo"), show_numbers))
             outcome = demo(to, seconds=seconds, seed=_SEED, real_time=not fast, baseline=baseline)
         if as_json:

@@ -2,22 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
-from livebode.cli.commands import panels
+from livebode.cli.commands import ABOUT, OPTIONS, panels
 from livebode.cli.frames import MINIMUM_WIDTH, paragraph, table, usage
 from livebode.plugins import named
-
-ABOUT = "The Bode plot of a machine while the machine works."
-OPTIONS: Mapping[str, str] = {
-    "--version": "Print the version and exit.",
-    "--log-level LEVEL": "Write a log from this level on: debug, info, warning or error. [default: info with "
-    "--log-file]",
-    "--log-file FILE": "Write the log there instead of on standard error.",
-    "--install-completion": "Install completion for the current shell.",
-    "--show-completion": "Show completion for the current shell, to copy it or customize the installation.",
-    "--help -h": "Show this message and exit.",
-}
 
 
 def first_page(width: int, *, colours: bool) -> str:

@@ -13,14 +13,13 @@ from typing import TYPE_CHECKING, Any
 
 from livebode.cli.picture_support import can_draw, tell_how_to_draw
 from livebode.cli.terminal import is_terminal, print_drawn
-from livebode.configuration import Axis
 from livebode.core import RunClock, counted, moment, moments_by
+from livebode.estimates import rule
 from livebode.locations import original
-from livebode.runtime import Outcome
 
 if TYPE_CHECKING:
     from livebode.fitting import CommonPoles, Fit
-    from livebode.runtime import Draw, SingleResponse
+    from livebode.runtime import Estimate, Outcome, SingleResponse
 
 _ALARMS_SHOWN = 8
 _ONE_AT_A_TIME = threading.Lock()
@@ -31,26 +30,31 @@ def one_drawing_at_a_time() -> threading.Lock:
     return _ONE_AT_A_TIME
 
 
-def drawing(title: str, names: tuple[str, str]) -> Draw:
-    """A function that draws bode.png and tracking.png, if Matplotlib is installed."""
-
-    def draw(estimate: SingleResponse, into: Path) -> None:
-        responses = estimate.overview.responses()
-        if not len(responses) or not can_draw():
-            return
-        from livebode.pictures import save_pictures  # with Matplotlib half a second to import
-
-        schedule, fitted = estimate.schedule_label, estimate.fit
-        with _ONE_AT_A_TIME:
-            save_pictures(responses, into, title=title, schedule_name=schedule, names=names, fitted=fitted)
-
-    return draw
+def draw(estimate: Estimate, into: Path) -> None:
+    """Draw the pictures of an estimate that a configuration describes."""
+    axis = estimate.axis
+    assert axis is not None
+    rule(axis.kind, "draw")(estimate, into)
 
 
-def drawing_of(axis: Axis) -> Draw:
-    """A function that draws the pictures of an axis with a single response."""
+def draw_response(estimate: SingleResponse, into: Path) -> None:
+    """Draw bode.png and tracking.png of an axis, if Matplotlib is installed."""
+    axis = estimate.axis
+    assert axis is not None
     names = (axis.signals.input or axis.signals.excitation or "", axis.signals.output)
-    return drawing(f"{axis.source.title}: {axis.signals.output}", names)
+    draw_titled(estimate, into, title=f"{axis.source.title}: {axis.signals.output}", names=names)
+
+
+def draw_titled(estimate: SingleResponse, into: Path, *, title: str, names: tuple[str, str]) -> None:
+    """Draw bode.png and tracking.png with this title and names of input and output, if Matplotlib is installed."""
+    responses = estimate.overview.responses()
+    if not len(responses) or not can_draw():
+        return
+    from livebode.pictures import save_pictures  # with Matplotlib half a second to import
+
+    schedule, fitted = estimate.schedule_label, estimate.fit
+    with _ONE_AT_A_TIME:
+        save_pictures(responses, into, title=title, schedule_name=schedule, names=names, fitted=fitted)
 
 
 def load_beside() -> None:

@@ -5,8 +5,10 @@ from __future__ import annotations
 import gc
 import re
 import signal
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,10 +19,8 @@ from livebode.cli.band import parsed_band
 from livebode.cli.failures import exit_code_of
 from livebode.cli.notices import NoticePrinter
 from livebode.cli.picture_support import tell_how_to_draw
-from livebode.cli.pictures import load_beside, tracked_amount
-from livebode.cli.publishing import published, publishing_to
+from livebode.cli.pictures import draw, load_beside, tracked_amount
 from livebode.cli.remote import recorded_at
-from livebode.cli.serving import SubscribersOf, served
 from livebode.configuration import Axes, Axis, ConfigurationFile, ServeSection
 from livebode.core import ConfigError, LocationError, UsageError
 from livebode.estimates import rule
@@ -32,6 +32,7 @@ from livebode.sources import read_head
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from livebode.cli.serving import SubscribersOf
     from livebode.publishing import Publisher
 
 
@@ -81,8 +82,14 @@ def run_targets(
                 "run it without the dashboard",
                 options=["--output-only", "--serve"],
             )
-        with served(serve, _serving(axes), port, entries, stays=not live) as subscribers_of:
-            publishing = published(axes, directory, target.stem, edited=live and file is not None)
+        shown: AbstractContextManager[SubscribersOf] = nullcontext(lambda _: ())
+        section = _serving(axes)
+        if serve:
+            from livebode.cli.serving import served
+
+            shown = served(section, port, entries, stays=not live)
+        with shown as subscribers_of:
+            publishing = _published(axes, directory, target.stem, edited=live and file is not None)
             with publishing as publisher:
                 if alone is not None and not live:
                     outcome = _run(alone, directory, force, as_json, subscribers_of(target.stem), publisher)
@@ -93,6 +100,30 @@ def run_targets(
                         axes, directory, force, as_json, file,
                         lambda name: subscribers_of(name or target.stem), send, publisher,
                     )  # fmt: skip
+
+
+@contextmanager
+def _published(axes: Axes, directory: Path, alone: str, *, edited: bool) -> Iterator[Publisher | None]:
+    """The publisher of these axes; None if none of them publishes, and the file cannot change that (`edited`).
+
+    `alone` is the name under which a single axis publishes.
+    """
+    if not edited and not any(axis.publish for axis in axes.values()):
+        yield None
+        return
+    from livebode.cli.serving import print_line
+    from livebode.publishing import Publisher
+
+    with Publisher(axes, directory.with_name(f"{directory.name}.outbox.sqlite"), print_line, alone=alone) as publisher:
+        yield publisher
+
+
+def _publishing_to(to: Destination, publisher: Publisher | None, name: str) -> Destination:
+    """The destination of an axis, with the publisher as a subscriber."""
+    if publisher is None:
+        return to
+    subscribers: tuple[Subscriber, ...] = (*to.subscribers, publisher.subscriber(name))
+    return replace(to, subscribers=subscribers, findings=partial(publisher.findings, name))
 
 
 def _file(target: Location, over: Mapping[str, Mapping[str, Any]]) -> ConfigurationFile | None:
@@ -184,8 +215,8 @@ def _run(
     """Track one recording."""
 
     def job(own: tuple[Subscriber, ...]) -> Outcome:
-        to = _destination(axis, directory, force, (*subscribers, *own))
-        return run(axis, publishing_to(replace(to, prepare=load_beside), publisher, ""))
+        to = Destination(directory, draw, force, (*subscribers, *own))
+        return run(axis, _publishing_to(replace(to, prepare=load_beside), publisher, ""))
 
     return _with_progress(job, quiet)
 
@@ -230,9 +261,9 @@ def _run_axes(
     from livebode.cli.axes_terminal import AxesTerminal, plain
     from livebode.runtime import Session
 
-    def to(name: str, axis: Axis) -> Destination:
+    def to(name: str, _: Axis) -> Destination:
         subscribers = (*subscribers_of(name), shown.subscriber(name))
-        return publishing_to(_destination(axis, directory / name, force, subscribers), publisher, name)
+        return _publishing_to(Destination(directory / name, draw, force, subscribers), publisher, name)
 
     gc.freeze()  # what is loaded remains: a search through it would stop all axes for tens of milliseconds
     shown = AxesTerminal(quiet=as_json)
@@ -257,11 +288,6 @@ def _run_axes(
     errors = [thread.error for thread in session.all if thread.error is not None and not thread.ended_early]
     if errors:
         raise typer.Exit(exit_code_of([error for error in errors if not isinstance(error, StoppedError)]))
-
-
-def _destination(axis: Axis, directory: Path, force: bool, subscribers: tuple[Subscriber, ...]) -> Destination:
-    """Where an axis is recorded, with its pictures."""
-    return Destination(directory, rule(axis.kind, "draw")(axis), force, subscribers)
 
 
 def _show(outcome: Outcome, axis: Axis, as_json: bool) -> None:

@@ -25,29 +25,22 @@ def print_line(sentence: str) -> None:
 
 def dashboard_of(section: ServeSection, port: int | None) -> Dashboard:
     """The dashboard of a configuration; `port` overrides its port."""
-    from livebode.dashboard import Dashboard, Serving
+    from livebode.dashboard import Dashboard, ServerSettings
 
     if port is not None:
         section = section.model_copy(update={"port": port})
-    return Dashboard(Serving.of(section), print_line)
+    return Dashboard(ServerSettings.of(section), print_line)
 
 
 @contextmanager
 def served(
-    required: bool,
-    section: ServeSection,
-    port: int | None,
-    entries: Mapping[str, Sequence[tuple[str, str]]],
-    stays: bool,
+    section: ServeSection, port: int | None, entries: Mapping[str, Sequence[tuple[str, str]]], stays: bool
 ) -> Iterator[SubscribersOf]:
-    """A function that returns the subscribers of an axis by its name: the dashboard, or nobody.
+    """A function that returns the subscribers of an axis by its name: the dashboard.
 
     `entries` has the axes that exist from the beginning, with the entries of their matrices; `stays` serves the page
     after the run until Ctrl-C.
     """
-    if not required:
-        yield lambda _: ()
-        return
     dashboard = dashboard_of(section, port)
 
     def hub(name: str) -> Subscriber:

@@ -10,8 +10,6 @@ import gc
 import os
 import sys
 
-from livebode.cli.first_page import first_page
-from livebode.cli.frames import has_colours, terminal_width
 from livebode.version import __version__
 
 _USAGE_ERROR, _INTERRUPTED = 2, 130
@@ -42,6 +40,9 @@ def main() -> None:
 
 
 def _help() -> str:
+    from livebode.cli.first_page import first_page  # with the commands of plug-ins
+    from livebode.cli.frames import has_colours, terminal_width
+
     return first_page(terminal_width(sys.stdout), colours=has_colours(sys.stdout))
 
 

@@ -35,14 +35,15 @@ from livebode.configuration.recorded import recorded_configuration as recorded_c
 from livebode.configuration.recorded import recorded_loop as recorded_loop
 from livebode.configuration.recorded import recorded_report as recorded_report
 from livebode.configuration.recorded import without_null as without_null
-from livebode.configuration.recording import open_even_or_uneven as open_even_or_uneven
 from livebode.configuration.recording import open_recording as open_recording
-from livebode.configuration.recording import with_shared_names as with_shared_names
+from livebode.configuration.recording import open_recordings as open_recordings
+from livebode.configuration.recording import with_log as with_log
 from livebode.configuration.report_section import MAGNITUDES as MAGNITUDES
 from livebode.configuration.report_section import MARGIN_UNITS as MARGIN_UNITS
 from livebode.configuration.report_section import LimitSection as LimitSection
 from livebode.configuration.report_section import ReportSection as ReportSection
 from livebode.configuration.report_section import read_template as read_template
+from livebode.configuration.report_section import report_error as report_error
 from livebode.configuration.schema import Schema as Schema
 from livebode.configuration.schema import axis_schema as axis_schema
 from livebode.configuration.schema import schema_of as schema_of

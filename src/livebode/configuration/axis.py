@@ -16,7 +16,6 @@ from livebode.configuration.machine_section import MachineSection
 from livebode.configuration.monitoring_section import MonitoringSection
 from livebode.configuration.motion_section import MotionSection
 from livebode.configuration.orders_section import OrdersSection
-from livebode.configuration.output_only import check_output_only
 from livebode.configuration.output_only_section import OutputOnlySection
 from livebode.configuration.publish_section import PublishSection, check_publish
 from livebode.configuration.ready import ReadyCondition, ready_condition
@@ -29,7 +28,8 @@ from livebode.configuration.toml_file import one_line, read_table, shortened
 from livebode.configuration.tracking_section import TrackingSection
 from livebode.core import ConfigError, nearest_name
 from livebode.estimates import MATRIX, RESPONSE, rule
-from livebode.sources.live import SourceSettings, check_keys, checked_address
+from livebode.sources import live
+from livebode.sources.live import SourceSettings
 
 NOT_RECORDED = {"serve", "publish"}
 """Sections that are about this computer and its network, and change no result: run.json has none of them."""
@@ -133,16 +133,18 @@ class Axis(ConfigurationSection):
                 keys=["source.log", keys[0]],
             ).at(origin)
         if axis.source.url is not None:
-            checked_address(axis.source.url, axis.source)
+            live.checked_address(axis.source.url, axis.source)
         if axis.source.replay is not None:
-            check_keys(axis.source, "replay")
+            live.check_keys(axis.source, "replay")
         try:
-            rule(MATRIX if axis.signals.is_matrix else RESPONSE, "check")(axis)
-        except ConfigError as error:
-            raise error.at(origin) from None
-        if axis.output_only is not None:
-            check_output_only(axis, origin)
-        try:
+            if axis.signals.is_matrix:
+                rule(MATRIX, "check")(axis)
+            else:
+                _check_no_matrix(axis.experiments, axis.loop, axis.monitoring)
+            if axis.output_only is not None:
+                from livebode.configuration.output_only import check_output_only
+
+                check_output_only(axis)
             check_publish(axis.publish)
         except ConfigError as error:
             raise error.at(origin) from None
@@ -220,6 +222,22 @@ def _with(path: Path, only: type[Only], name: str) -> Only | Axis:
         return only.model_validate(data)
     except ValidationError as error:
         raise _first_of(error).at(str(path)) from None
+
+
+def _check_no_matrix(experiments: ExperimentsSection | None, loop: LoopSection, monitoring: MonitoringSection) -> None:
+    """ConfigError if an axis with a single response sets what only a matrix has."""
+    unused = ["experiments"] if experiments is not None else []
+    if loop.controllers:
+        unused.append("loop.controllers")
+    if monitoring.gantry is not None:
+        unused.append("monitoring.gantry")
+    if unused:
+        raise ConfigError(
+            "key-conflict",
+            f"{unused[0]} belongs to a matrix of responses, but [signals] names one output and one input",
+            "remove it, or list several channels in signals.output or signals.input",
+            key=unused[0],
+        )
 
 
 def _of_one_recording(axis: Axis) -> list[str]:

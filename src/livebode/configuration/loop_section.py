@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from math import inf
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field
 
+from livebode import core
 from livebode.configuration.section import ConfigurationSection, Positive
-from livebode.core import CHANNELS_MAX, PID, Cascade, ConfigError, Gain, Loop, Model, PositionPD, UsageError, counted
+from livebode.core import CHANNELS_MAX, ConfigError, UsageError, counted
+
+if TYPE_CHECKING:
+    from livebode.core import Loop, Model
 
 SAME_RATE = 1e-6
 Ticks = Annotated[int, Field(ge=0)]
@@ -169,7 +173,7 @@ class LoopSection(ConfigurationSection):
                     controller_rate_hz=part.rate_hz,
                     rate_divider=part.rate_divider,
                 )
-        return Loop(
+        return core.Loop(
             feedback=self._feedback(),
             entry=self._entry(),
             input_logged=self.input_logged,
@@ -199,7 +203,7 @@ class LoopSection(ConfigurationSection):
                     "remove loop.velocity and loop.position",
                     key="loop.position_pd",
                 )
-            return PositionPD(**self.position_pd.model_dump())
+            return core.PositionPD(**self.position_pd.model_dump())
         if self.velocity is None:
             if self.position is not None:
                 raise ConfigError(
@@ -209,14 +213,14 @@ class LoopSection(ConfigurationSection):
                     key="loop.velocity",
                 )
             return None
-        velocity = PID(**self.velocity.model_dump())
+        velocity = core.PID(**self.velocity.model_dump())
         if self.position is None:
             return velocity
-        return Cascade(velocity, PID(**self.position.model_dump()), self.velocity_differenced)
+        return core.Cascade(velocity, core.PID(**self.position.model_dump()), self.velocity_differenced)
 
     def _entry(self) -> Model | None:
         if self.excitation_at == "plant input":
-            return None if self.entry_gain == 1.0 else Gain(self.entry_gain)
+            return None if self.entry_gain == 1.0 else core.Gain(self.entry_gain)
         if self.excitation_at == "velocity reference":
             if self.velocity is None:
                 raise ConfigError(
@@ -225,7 +229,7 @@ class LoopSection(ConfigurationSection):
                     "describe the velocity controller",
                     key="loop.velocity",
                 )
-            return self.entry_gain * PID(**self.velocity.model_dump())
+            return self.entry_gain * core.PID(**self.velocity.model_dump())
         feedback = self._feedback()
         if feedback is None:
             raise ConfigError(
@@ -234,4 +238,4 @@ class LoopSection(ConfigurationSection):
                 "describe loop.velocity",
                 key="loop.velocity",
             )
-        return Gain(-self.entry_gain) * feedback
+        return core.Gain(-self.entry_gain) * feedback

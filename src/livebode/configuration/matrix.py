@@ -1,4 +1,4 @@
-"""The controllers of a matrix of responses, and which keys of an axis only a matrix has."""
+"""The controllers of a matrix of responses."""
 
 from __future__ import annotations
 
@@ -8,25 +8,8 @@ from typing import TYPE_CHECKING
 from livebode.core import ConfigError, Model
 
 if TYPE_CHECKING:
-    from livebode.configuration.axis import Axis
     from livebode.configuration.loop_section import ControllerSection, LoopSection
-    from livebode.mimo import MatrixLoop
-
-
-def check_no_matrix(axis: Axis) -> None:
-    """ConfigError if an axis with a single response sets what only a matrix has."""
-    unused = ["experiments"] if axis.experiments is not None else []
-    if axis.loop.controllers:
-        unused.append("loop.controllers")
-    if axis.monitoring.gantry is not None:
-        unused.append("monitoring.gantry")
-    if unused:
-        raise ConfigError(
-            "key-conflict",
-            f"{unused[0]} belongs to a matrix of responses, but [signals] names one output and one input",
-            "remove it, or list several channels in signals.output or signals.input",
-            key=unused[0],
-        )
+    from livebode.core import MatrixLoop
 
 
 def check_controllers(loop: LoopSection, outputs: Sequence[str], inputs: Sequence[str]) -> None:
@@ -52,7 +35,7 @@ def _check_controller(controller: ControllerSection, outputs: Sequence[str], inp
 
 def matrix_loop(loop: LoopSection, inputs: list[str], outputs: list[str], rate_hz: float) -> MatrixLoop:
     """The loop of these [[loop.controllers]], recorded at `rate_hz`; ConfigError if a controller cannot be built."""
-    from livebode.mimo import MatrixLoop
+    from livebode.core import MatrixLoop
 
     feedback: list[list[Model | None]] = [[None] * len(outputs) for _ in inputs]
     for controller in loop.controllers:

@@ -14,7 +14,7 @@ _USED = {
 _USED_WHOLE = {"source", "output_only", "serve", "machine"}
 
 
-def check_output_only(axis: BaseModel, origin: str) -> None:
+def check_output_only(axis: BaseModel) -> None:
     """ConfigError if an axis with [output_only] sets something that only a response has, or has a live source."""
     source: BaseModel = axis.source  # type: ignore[attr-defined]
     if source.live:  # type: ignore[attr-defined]
@@ -23,7 +23,7 @@ def check_output_only(axis: BaseModel, origin: str) -> None:
             "[output_only] needs a recording, but the source is live",
             "record the outputs, and set source.log",
             key="output_only",
-        ).at(origin)
+        )
     unused = ["source.skip_periods"] if "skip_periods" in source.model_fields_set else []
     for name in sorted(axis.model_fields_set - _USED_WHOLE):
         section = getattr(axis, name)
@@ -38,4 +38,4 @@ def check_output_only(axis: BaseModel, origin: str) -> None:
             f"{unused[0]} belongs to a response, and an output-only run has none",
             "remove it, or remove output_only",
             key=unused[0],
-        ).at(origin)
+        )

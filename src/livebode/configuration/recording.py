@@ -1,14 +1,14 @@
-"""The recording that a configuration names."""
+"""The recordings that a configuration names."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
-from livebode import sources
 from livebode.configuration.axis import Axis
-from livebode.core import RecordingError
-from livebode.locations import local_copy
-from livebode.sources import UNEVEN, Log, open_log
+from livebode.estimates import RESPONSE
+from livebode.locations import Location
+from livebode.sources import Log, even_or_uneven_log, located, log_of, open_file, open_log
 
 _NAMES = {
     "signals": ("outputs", "inputs", "excitations", "schedule", "ready"),
@@ -21,49 +21,57 @@ _NAMES = {
 def open_recording(axis: Axis) -> Log:
     """Open the one recording in [source] at the clock of the output; LivebodeError if it cannot be read."""
     (path,) = axis.source.logs
-    return open_log(path, **_reading(axis), channels=axis.signals.listed("output"))
+    return open_log(path, **_reading(axis), dbc=axis.source.dbc, channels=axis.signals.listed("output"))
 
 
-def open_even_or_uneven(axis: Axis) -> Log:
-    """The same; a Log that is not `even` if the clock of the output jitters, or other channels have other clocks."""
-    signals, reading = axis.signals, _reading(axis)
-    (path,) = axis.source.logs
+def open_recordings(axis: Axis) -> tuple[Axis, list[Log]]:
+    """Open the recordings in [source], none of a live source; only the single one of a single response may be uneven.
+
+    Returned with the axis whose channels are named without the name of the file, so that runs on other files have the
+    same. LivebodeError if one cannot be read.
+    """
+    in_use, reading = _in_use(axis) if axis.kind == RESPONSE else [], _reading(axis)
+    places = () if axis.source.live else axis.source.logs
+    logs: list[Log] = []
+    for place in places:
+        with located(place):
+            recording, outputs = open_file(place, axis.source.dbc), axis.signals.listed("output")
+            if in_use and len(places) == 1:
+                logs.append(even_or_uneven_log(recording, outputs, in_use, **reading))
+            else:
+                logs.append(log_of(recording, channels=outputs, **reading))
+        if len(logs) == 1:
+            sections = {name: section for name in _NAMES if (section := getattr(axis, name)) is not None}
+            shared = {name: _renamed(one, _NAMES[name], logs[0].shared_name) for name, one in sections.items()}
+            axis = axis.model_copy(update=shared)
+    return axis, logs
+
+
+def _in_use(axis: Axis) -> list[str]:
+    """The channels of a single response, that of the reference first."""
+    signals = axis.signals
     named = [signals.excitation, signals.input, signals.output, signals.schedule, *axis.monitoring.covariates]
     if axis.tracking.estimator == "direct":
         named = [signals.input, *named]
-    names = list(dict.fromkeys(name for name in named if name))
-    with local_copy(path):
-        try:
-            log = open_log(path, channels=signals.listed("output"), **reading)
-            log.check_clocks(names)
-            return log
-        except RecordingError as error:
-            if error.code not in UNEVEN or reading["time"] == "none":
-                raise
-        return sources.open_uneven(path, names, **reading)
+    return list(dict.fromkeys(name for name in named if name))
 
 
-def with_shared_names(axis: Axis, log: Log) -> Axis:
-    """The axis whose channels are named without the name of the file, so that runs on other files have the same."""
+def with_log(axis: Axis, place: Location) -> Axis:
+    """The axis with one of its recordings."""
+    return axis.model_copy(update={"source": axis.source.model_copy(update={"log": place})})
 
-    def shared(names: Any) -> Any:
+
+def _renamed(section: Any, keys: tuple[str, ...], shared: Callable[[str], str]) -> Any:
+    """The section with other names of its channels."""
+
+    def of(names: Any) -> Any:
         if isinstance(names, str):
-            return log.shared_name(names)
-        return names if names is None else type(names)(map(shared, names))
+            return shared(names)
+        return names if names is None else type(names)(map(of, names))
 
-    changed = {}
-    for section, keys in _NAMES.items():
-        if (one := getattr(axis, section)) is not None:
-            changed[section] = one.model_copy(update={key: shared(getattr(one, key)) for key in keys})
-    return axis.model_copy(update=changed)
+    return section.model_copy(update={key: of(getattr(section, key)) for key in keys})
 
 
 def _reading(axis: Axis) -> dict[str, Any]:
     source = axis.source
-    return {
-        "rate_hz": source.rate_hz,
-        "time": source.time,
-        "kinds": source.kinds,
-        "clock": source.clock,
-        "dbc": source.dbc,
-    }
+    return {"rate_hz": source.rate_hz, "time": source.time, "kinds": source.kinds, "clock": source.clock}

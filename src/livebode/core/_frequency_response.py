@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from livebode.arrays import Complex, Floats
-from livebode.core._kinds import PlotKind
 from livebode.core.lines import Lines, position, within
 from livebode.plugins import loaded
 
@@ -18,6 +17,9 @@ if TYPE_CHECKING:
     from xarray import Dataset
 
     from livebode.core._response import Responses
+
+PlotKind = Literal["bode", "nyquist", "nichols"]
+
 
 Quantity = Literal["plant", "open loop", "closed loop", "sensitivity"]
 
@@ -44,7 +46,7 @@ class FrequencyResponse:
     unit: str
 
     def _batch(self) -> Responses:
-        """This response as Responses."""
+        """Responses with this one as the only row, or all."""
         raise NotImplementedError
 
     def __call__(self, frequency_hz: ArrayLike) -> Any:
@@ -109,11 +111,11 @@ measured line; the nearest are 50 and 60 Hz
         (2,)
         """
         if isinstance(frequency_hz, slice):
-            at = within(self.lines, frequency_hz)
+            positions = within(self.lines, frequency_hz)
         else:
-            at = np.unique(position(self.lines, np.atleast_1d(frequency_hz)))
-        columns: dict[str, Any] = {name: getattr(self, name)[..., at] for name in PER_LINE}
-        return replace(self, lines=self.lines.take(at), **columns)  # type: ignore[type-var]
+            positions = np.unique(position(self.lines, np.atleast_1d(frequency_hz)))
+        columns: dict[str, Any] = {name: getattr(self, name)[..., positions] for name in PER_LINE}
+        return replace(self, lines=self.lines.take(positions), **columns)  # type: ignore[type-var]
 
     def plot(
         self,

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from livebode.configuration import Axis, ServeSection
 from livebode.core import LivebodeError, why
-from livebode.dashboard import Serving, listening
+from livebode.dashboard import ServerSettings, listening
 from livebode.doctor.check import Check
 from livebode.records import SegmentLimits
 from livebode.sources.live import BUFFER_BYTES
@@ -58,9 +58,9 @@ def _sync_s(place: Path) -> float:
     with tempfile.TemporaryFile(dir=place, buffering=0) as file:
         for _ in range(_SYNCS):
             began = time.perf_counter()
-            rest = memoryview(piece)
-            while rest:
-                rest = rest[file.write(rest) :]
+            remaining = memoryview(piece)
+            while remaining:
+                remaining = remaining[file.write(remaining) :]
             os.fsync(file.fileno())
             longest = max(longest, time.perf_counter() - began)
     return longest
@@ -108,7 +108,7 @@ def check_dashboard_port(axes: Mapping[str, Axis]) -> Check:
     section = described or ServeSection()
     facts = {"address": section.address, "port": section.port}
     try:
-        with listening(Serving.of(section)):
+        with listening(ServerSettings.of(section)):
             pass
     except LivebodeError as error:
         failed = Check.of_error(DASHBOARD_PORT, error)

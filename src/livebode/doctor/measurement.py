@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from livebode.configuration import Axis, open_even_or_uneven, open_recording
+from livebode.configuration import Axis, open_recordings, with_log
 from livebode.core import LivebodeError, counted
 from livebode.doctor.check import Check
 from livebode.doctor.subject import Subject
@@ -27,13 +27,12 @@ def check_recording(name: str, axis: Axis, path: Location) -> Check:
             return Check(name, "failed", f"{path} cannot be read", "check its permissions", facts)
     if axis.source.follow:
         return Check(name, "ok", f"{path} can be read", facts=facts)
-    own = axis.model_copy(update={"source": axis.source.model_copy(update={"log": path})})
     signals = axis.signals
     roles = [name for role in ("excitation", "input", "output") for name in signals.listed(role)]
     names = [*roles, signals.schedule, *axis.monitoring.covariates]
-    opened = open_recording if signals.is_matrix else open_even_or_uneven  # matrices need one clock
     try:
-        channels = contents_of(opened(own), list(dict.fromkeys(filter(None, names)))).channels
+        _, (log,) = open_recordings(with_log(axis, path))
+        channels = contents_of(log, list(dict.fromkeys(filter(None, names)))).channels
     except LivebodeError as error:
         return Check.of_error(name, error)
     silent = [_silence(channel) for channel in channels if not channel.minimum < channel.maximum]
@@ -68,8 +67,8 @@ def _check(of: str, axis: Axis) -> Check:
             samples = RecordedRun(settings.replay).samples
             return Check(name, "ok", f"{settings.replay} has {counted(samples, 'recorded sample')}")
         if settings.url is None:
-            found = [check_recording(name, axis, path) for path in settings.logs]
-            return next((check for check in found if check.verdict != "ok"), found[0])
+            checks = [check_recording(name, axis, path) for path in settings.logs]
+            return next((check for check in checks if check.verdict != "ok"), checks[0])
         reach = make_source(settings).reach()
         return Check(name, reach.verdict, reach.message, reach.remedy, reach.facts)
     except LivebodeError as error:
@@ -86,9 +85,9 @@ def check_configuration(subject: Subject) -> Check:
     if (error := subject.problems.get(CONFIGURATION)) is not None:
         return Check.of_error(CONFIGURATION, error)
     axes = "1 axis" if len(subject.axes) == 1 else f"{len(subject.axes)} axes"
-    what = subject.kind.title if subject.kind is not None else axes
+    words = subject.kind.title if subject.kind is not None else axes
     facts = {"path": str(subject.configuration), "axes": list(subject.axes)}
-    return Check(CONFIGURATION, "ok", f"{subject.configuration} is valid: {what}", facts=facts)
+    return Check(CONFIGURATION, "ok", f"{subject.configuration} is valid: {words}", facts=facts)
 
 
 def check_run(subject: Subject) -> Check:

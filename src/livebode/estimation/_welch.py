@@ -6,7 +6,7 @@ import numpy as np
 
 from livebode.core import Block, Lines, Response, SignalError, UsageError, needing
 from livebode.estimation.products import power
-from livebode.estimation.welch_average import independent_windows
+from livebode.estimation.quotient import independent_windows
 
 
 def welch(

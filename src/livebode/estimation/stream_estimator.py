@@ -133,7 +133,7 @@ def signals_of(block: Block, settings: Settings) -> tuple[Floats, Floats | None]
 
 
 def _rows(data: Floats, which: list[int]) -> Floats:
-    """These rows; no copy where they are contiguous and evenly spaced, as three channels in the usual orders are."""
+    """Rows of these channels; no copy where they are evenly spaced, as three channels in the usual orders are."""
     first, step = which[0], which[1] - which[0] if len(which) > 1 else 1
     if step == 0 or data.strides[1] != data.itemsize or which != list(range(first, first + step * len(which), step)):
         return data[which]

@@ -57,9 +57,9 @@ class InputStatistics(StreamCounters):
 
     def count(self, block: Block, rows: SpectraRows) -> None:
         """Count the excluded samples; one Event for all that are within a window of each other."""
-        found = {"non-finite": rows.not_finite, "implausible": rows.implausible, "spike": rows.spikes}
+        excluded = {"non-finite": rows.not_finite, "implausible": rows.implausible, "spike": rows.spikes}
         new: list[tuple[int, str]] = []
-        for kind, position in found.items():
+        for kind, position in excluded.items():
             if not position.size:
                 continue
             self.counts[kind] += position.size
@@ -70,10 +70,10 @@ class InputStatistics(StreamCounters):
         for sample, kind in sorted(new):
             self._exclude(kind, block, sample, _KINDS[kind])
 
-    def _exclude(self, kind: str, block: Block, sample: int, what: str, **details: int) -> None:
+    def _exclude(self, kind: str, block: Block, sample: int, cause: str, **details: int) -> None:
         message = Message(
             "{what}; responses are invalid until a window of {window} samples is complete again",
-            what=what,
+            what=cause,
             window=self._window,
         )
         self._report(kind, block, sample, message, **details)

@@ -15,7 +15,7 @@ def medians(x: Floats, axis: int) -> Floats:
     """`np.median(x, axis)` of a non-empty two-dimensional array, to the bit: NaN where a value is NaN."""
     ordered = np.sort(np.ascontiguousarray(x.T) if axis == 0 else x, axis=1)
     middle = ordered.shape[1] // 2
-    found = ordered[:, middle]
+    median = ordered[:, middle]
     if not ordered.shape[1] % 2:
-        found = (ordered[:, middle - 1] + found) / 2
-    return np.where(np.isnan(ordered[:, -1]), np.nan, found)
+        median = (ordered[:, middle - 1] + median) / 2
+    return np.where(np.isnan(ordered[:, -1]), np.nan, median)

@@ -25,11 +25,11 @@ def cut(x: Floats, period: int) -> Floats:
     if count > 1:
         slope[-1] = slope[-2]
     before = np.concatenate((slope[:1], slope[:-1]))
-    at = (np.arange(period) + 0.5) / period - 0.5  # position about the middle of the period
-    middle = np.searchsorted(at, 0.0)
+    position = (np.arange(period) + 0.5) / period - 0.5  # position about the middle of the period
+    middle = np.searchsorted(position, 0.0)
     drift = np.empty_like(blocks)
-    np.multiply.outer(before, at[:middle], out=drift[:, :middle])
-    np.multiply.outer(slope, at[middle:], out=drift[:, middle:])
+    np.multiply.outer(before, position[:middle], out=drift[:, :middle])
+    np.multiply.outer(slope, position[middle:], out=drift[:, middle:])
     drift += level[:, np.newaxis]
     np.subtract(blocks, drift, out=drift)
     drift -= typical.mean()

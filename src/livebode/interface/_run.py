@@ -8,7 +8,7 @@ from html import escape
 from os import PathLike
 from typing import TYPE_CHECKING, Any, Literal
 
-from livebode.analysis import Averaged, Margins, averaged, fit_averaged, loop_report
+from livebode.analysis import Margins, RunMean, averaged, fit_averaged, loop_report
 from livebode.configuration import Axis, FitSection, MachineSection, recorded_configuration, recorded_loop
 from livebode.core import (
     Event,
@@ -138,7 +138,7 @@ class Run:
         return Table.join([Table.empty(PARAMETERS.schema), *parts])
 
     @cached_property
-    def _averaged(self) -> Averaged:
+    def _averaged(self) -> RunMean:
         return averaged(self._record)
 
     @property
@@ -172,10 +172,12 @@ class Run:
         >>> axes.get_legend_handles_labels()[1]
         ['average', 'bound: 98.2 % (2σ)']
         """
-        found = self._averaged
+        average = self._averaged
         words = label or "average"
         bound = c if bounds else None
-        return plot_responses(found.overview, kind, axes=axes, c=bound, label=words, color=color, front=found.response)
+        return plot_responses(
+            average.overview, kind, axes=axes, c=bound, label=words, color=color, front=average.response
+        )
 
     def fit(
         self,

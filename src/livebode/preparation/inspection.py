@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from itertools import groupby
 from pathlib import Path
-from typing import Any, Literal, TypedDict
+from typing import Any, Literal
 
 import numpy as np
 
@@ -24,7 +24,7 @@ from livebode.preparation.plan import SEARCHED, beginning
 from livebode.preparation.quiet import Quiet, look_for_hum
 from livebode.preparation.transients import EXAMINED_MIN
 from livebode.preparation.uneven_plan import clock_facts
-from livebode.sources import UNEVEN, ClockGroup, Log, Skipped, UnevenLog, open_log, open_uneven
+from livebode.sources import UNEVEN, ClockGroup, Log, Recording, Skipped, UnevenLog, log_of, open_file, uneven_log_of
 
 StretchKind = Literal["silence", "transient", "periodic", "outlying", "differing"]
 
@@ -86,14 +86,6 @@ _WITHOUT_RATE = tuple(
 
 
 _NOT_REPEATING = ("signal.not-periodic", "signal.too-short")
-
-
-class _Given(TypedDict):
-    """What `open_log` is given besides the rate."""
-
-    time: str | None
-    dbc: Path | None
-    channels: list[str] | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,9 +204,8 @@ def inspect(
         If it cannot be read, the excitation cannot be judged, or the part has no samples.
     """
     required = [name for name in (excitation, output, input) if name is not None]
-    given: _Given = {"time": time, "dbc": dbc, "channels": required[:1] or None}
     needs_rate = bool(excitation or lines or begin is not None or end is not None or skip_periods)
-    log, without_rate = open_with_or_without_rate(path, rate_hz, given, required, needs_rate=needs_rate)
+    log, without_rate = log_with_or_without_rate(open_file(path, dbc), rate_hz, time, required, needs_rate=needs_rate)
     if isinstance(log, UnevenLog) and excitation is not None:
         log = log.at_rate(measured_grid(log, excitation, given=rate_hz is not None)[1])
     log = chosen_part(log, begin, end, skip_periods, lambda part: _periods_in(part, excitation))
@@ -241,23 +232,24 @@ def inspect(
     return Inspection(log, contents, found, quiet, unrecognised, without_rate, estimator)
 
 
-def open_with_or_without_rate(
-    path: Location, rate_hz: float | None, given: _Given, required: Sequence[str], *, needs_rate: bool
+def log_with_or_without_rate(
+    recording: Recording, rate_hz: float | None, time: str | None, required: Sequence[str], *, needs_rate: bool
 ) -> tuple[Log, str]:
     """The log, and why it has no rate (empty if it has one); the channels can be listed without.
 
     An UnevenLog if its clock jitters, or if the `required` channels have several clocks.
     """
+    channels = required[:1] or None
     try:
-        log = open_log(path, rate_hz=rate_hz, **given)
+        log = log_of(recording, rate_hz=rate_hz, time=time, channels=channels)
         log.naming(required)
         return log, ""
     except RecordingError as error:
-        if error.code in UNEVEN and given["time"] != "none":
-            return open_uneven(path, required, rate_hz=rate_hz, time=given["time"], dbc=given["dbc"]), ""
+        if error.code in UNEVEN and time != "none":
+            return uneven_log_of(recording, required, rate_hz=rate_hz, time=time), ""
         if needs_rate or rate_hz is not None or error.code not in _WITHOUT_RATE:
             raise
-        return open_log(path, rate_hz=1.0, **(given | {"time": "none"})), str(error)
+        return log_of(recording, rate_hz=1.0, time="none", channels=channels), str(error)
 
 
 def _periods_in(log: Log, excitation: str | None) -> tuple[int, int]:

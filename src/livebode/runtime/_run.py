@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 
-from livebode.configuration import NOT_RECORDED, Axis
+from livebode.configuration import NOT_RECORDED, Axis, open_recordings
 from livebode.core import RunClock, moments_by
 from livebode.estimates import rule
 from livebode.runtime.destination import Destination
@@ -18,7 +18,7 @@ from livebode.runtime.summary import provenance
 def run(axis: Axis, to: Destination, control: RunControl | None = None) -> Outcome:
     """Track a recording or several, or a machine while it works, and write a run directory.
 
-    A recording is written in one piece, or in segments if the axis has a [record]. A live source is always recorded in
+    A recording is written at once, or with a journal if the axis has a [record]. A live source is always recorded in
     segments, and ends with its sender or when `control` requests it; all received samples are then recorded. The same
     axis in the same directory continues an unfinished run: a live source with the sender's next sample, where missing
     samples are a gap whose length follows from the sender's numbers. A change of the configuration by `control`
@@ -29,17 +29,18 @@ def run(axis: Axis, to: Destination, control: RunControl | None = None) -> Outco
     ------
     LivebodeError
         For any error in the recording or the configuration, if the machine rejects the connection, or if the run is
-        stopped before samples arrive. In one piece nothing is written; in segments what was recorded so far remains.
+        stopped before samples arrive. At once nothing is written; with a journal what was recorded so far remains.
     StoppedError
         If `control` ends a recording before its end; the directory is as for an error.
     """
     control, started = control or RunControl(), time.perf_counter()
     kind = axis.kind
-    if axis.source.live:
+    named, logs = open_recordings(axis)
+    if not logs:
         from livebode.runtime.live import run_live
 
         return run_live(axis, to, control)
-    of: ExaminedRecording = rule(kind, "recording")(axis, to)
+    of: ExaminedRecording = rule(kind, "recording")(named, logs, to)
     about = {"configuration": of.axis.model_dump(mode="json", exclude=NOT_RECORDED, by_alias=True), "found": of.found}
     about |= provenance(of.axis, of.digests)
     feed = Feed(of.source, control, noticed=of.noticed, recorded=of.recorded, started=started)

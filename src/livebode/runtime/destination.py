@@ -27,8 +27,8 @@ class Destination:
     Parameters
     ----------
     directory
-        Directory of the run. In one piece it appears only when complete; in segments it exists from the beginning,
-        and an unfinished one of the same axis is continued.
+        Directory of the run. Written at once it appears only when complete; with a journal it exists from the
+        beginning, and an unfinished one of the same axis is continued.
     draw
         Called to add pictures: with the estimate, and the directory before it is renamed.
     force

@@ -11,10 +11,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from livebode.core import Block, Channel, Event, MatrixResponses, Parameters, Responses
+from livebode.core import Block, Channel, Event, MatrixResponses, Responses
 
 if TYPE_CHECKING:
     from livebode.analysis import Overview
+    from livebode.core import Parameters
     from livebode.runtime.run_control import RunControl
 
 VERSION = 1

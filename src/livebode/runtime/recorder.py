@@ -1,4 +1,4 @@
-"""Recorder: the record of a run, as the run loop uses it; WholeRecord: a record in one piece."""
+"""Recorder: the record of a run, as the run loop uses it; WholeRecord: a record that is written at once."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class Recorder(Protocol):
-    """The record of a run, in one piece or in segments. Used as a context manager around the run."""
+    """The record of a run, written at once or with a journal. Used as a context manager around the run."""
 
     path: Path
 

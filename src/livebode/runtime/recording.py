@@ -1,19 +1,24 @@
-"""A recording examined as a whole, before it is tracked."""
+"""A recording or several, examined as a whole before they are tracked."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from livebode.configuration import Axis, open_even_or_uneven, with_shared_names
-from livebode.core import Event
+from livebode import estimation, fitting, preparation
+from livebode.configuration import Axis, with_log
+from livebode.core import Block, Channel, Event, RecordingError
 from livebode.estimation import Follower, Tracker, hum_events, hum_spans
-from livebode.fitting import DriftTest
+from livebode.language import Message
+from livebode.locations import Location, local_copy
 from livebode.preparation import (
     AlignedLog,
+    ChannelCheck,
     configured_part,
     early_spikes,
     make_follower,
+    make_settings,
     roles_in_doubt,
     silences,
     slip_event,
@@ -21,22 +26,24 @@ from livebode.preparation import (
     steady,
     window_in_doubt,
 )
+from livebode.records import content_sha256
 from livebode.runtime.destination import Destination
 from livebode.runtime.estimate import ExaminedRecording
 from livebode.runtime.single_response import SingleResponse
-from livebode.runtime.summary import dated
-from livebode.sources import Log
+from livebode.runtime.summary import RecordedSpan, dated, recorded
+from livebode.sources import Log, located
 
 
-def examined_recording(axis: Axis, to: Destination) -> ExaminedRecording:
-    """Open a recording, and examine it as a whole."""
-    opened = open_even_or_uneven(axis)
-    if not opened.even:
+def examined_recordings(axis: Axis, logs: Sequence[Log], to: Destination) -> ExaminedRecording:
+    """A recording or several, of which each is examined as a whole; several are tracked one after the other."""
+    if len(logs) > 1:
+        return _examined_one_by_one(axis, logs)
+    (log,) = logs
+    if not log.even:
         from livebode.runtime.uneven_recording import examined_uneven
 
-        return examined_uneven(axis, opened)
-    axis = with_shared_names(axis, opened)
-    log = configured_part(axis, opened)
+        return examined_uneven(axis, log)
+    log = configured_part(axis, log)
     follower = make_follower(axis, log)
     log = log.naming(axis.signals.named)
     estimate = SingleResponse.of(axis, follower, log.channels)
@@ -44,7 +51,7 @@ def examined_recording(axis: Axis, to: Destination) -> ExaminedRecording:
     to.prepare()
     of, settings = examined(axis, log, follower), follower.settings
     if settings.quantity == "plant" and settings.periodic and not settings.average:
-        estimate.drift = DriftTest(settings.lines)
+        estimate.drift = fitting.DriftTest(settings.lines)
     return ExaminedRecording(axis, of.source, estimate, of.found, log.clock_kind, dated(log), of.noticed)
 
 
@@ -81,3 +88,154 @@ def examined(axis: Axis, log: Log, follower: Follower, shift: int = 0) -> Examin
     if log.is_part:
         found["part"] = {"first": log.first, "stop": log.stop}
     return Examined(source, noticed, found)
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """A recording in the run, whose sample n has the number n + shift there; `stop` is the number after its last."""
+
+    log: Log
+    sha256: str
+    of: Examined
+    tracker: Tracker
+    shift: int
+    stop: int
+
+    @property
+    def first(self) -> int:
+        return self.of.source.first + self.shift
+
+
+@dataclass(frozen=True, eq=False)
+class SuccessiveRecordings:
+    """Several recordings as one source: the numbers of their samples follow each other, with a gap between them.
+
+    All have the rate of the first.
+    """
+
+    sources: Sequence[AlignedLog]
+    shifts: Sequence[int]
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        return self.sources[0].channels
+
+    @property
+    def samples(self) -> int | None:
+        known = [source.samples for source in self.sources]
+        return None if None in known else sum(samples or 0 for samples in known)
+
+    def blocks(self, channels: Sequence[str] | None = None) -> Iterator[Block]:
+        """The Blocks of all recordings; their times count from sample 0 of the first one."""
+        rate_hz = None
+        for source, shift in zip(self.sources, self.shifts):
+            begins = True
+            for block in source.blocks(channels):
+                rate_hz = rate_hz or block.rate_hz
+                number, gap = block.start + shift, block.gap or begins
+                yield replace(block, rate_hz=rate_hz, start=number, origin_s=0.0, gap=gap)
+                begins = False
+
+
+def _examined_one_by_one(axis: Axis, logs: Sequence[Log]) -> ExaminedRecording:
+    parts = _parts(axis, logs)
+    sources, settings = [part.of.source for part in parts], parts[0].tracker.settings
+    starts, differ = [part.first for part in parts], preparation.realisations(sources, settings)
+    estimate = SingleResponse.of(
+        axis, estimation.SuccessiveTrackers([part.tracker for part in parts], starts), parts[0].log.channels
+    )
+    estimate.recordings = fitting.RecordingsMean(starts, realisations=differ)
+    found = parts[0].of.found | {
+        "clock": "relative",
+        "phase_slips": sum(part.of.found["phase_slips"] for part in parts),
+        "left_out_samples": sum(part.of.found["left_out_samples"] for part in parts),
+        "recordings": [_about(part) for part in parts],
+        "realisations": differ,
+    }
+    found.pop("part", None)
+    date = recorded([_span(part) for part in parts])
+    return ExaminedRecording(
+        axis,
+        SuccessiveRecordings(sources, [part.shift for part in parts]),
+        estimate,
+        found,
+        "relative",
+        lambda _: date,
+        [_named(event, part) for part in parts for event in part.of.noticed],
+        [part.sha256 for part in parts],
+    )
+
+
+def _parts(axis: Axis, logs: Sequence[Log]) -> list[_Part]:
+    """The recordings with their places in the run."""
+    parts: list[_Part] = []
+    for path, opened in zip(axis.source.logs, logs, strict=True):
+        own = with_log(axis, path)
+        with located(path):
+            log = configured_part(own, opened)
+            log = log.naming(list(dict.fromkeys([*axis.signals.named, *axis.monitoring.covariates])))
+            settings = make_settings(own, log)
+            if parts:
+                preparation.check_same(parts[0].log, parts[0].tracker.settings, log, settings)
+                settings = parts[0].tracker.settings
+            sha256 = _sha256(path, parts)
+            parts.append(_part(own, log, sha256, Tracker(settings), parts[-1].stop if parts else 0))
+    return parts
+
+
+def _sha256(place: Location, before: Sequence[_Part]) -> str:
+    """The file's checksum; RecordingError if it is that of an earlier one, which would count as twice the evidence."""
+    with local_copy(place) as path:
+        found = content_sha256(path)
+    same = next((part.log.path for part in before if part.sha256 == found), None)
+    if same is not None:
+        raise RecordingError(
+            "recording-repeated",
+            f"{place} has the same content as {same}",
+            "give each recording once",
+            path=str(place),
+            other=str(same),
+        )
+    return found
+
+
+def _part(axis: Axis, log: Log, sha256: str, tracker: Tracker, behind: int) -> _Part:
+    """The recording with whole periods between it and the number `behind`, so that its phases stay as they are."""
+    settings = tracker.settings
+    window, names = settings.lines.window, [name for role in settings.roles if (name := settings.channel(role))]
+    shift = -(-(behind + window - log.first) // window) * window if behind else 0
+    of = examined(axis, log, tracker, shift)
+    stop, check = of.source.first, ChannelCheck(tuple(names), settings.channel(settings.method.reference) or "")
+    for block in of.source.blocks(list(dict.fromkeys(names))):
+        check.take(block)
+        stop = block.stop
+    check.finish()
+    return _Part(log, sha256, of, tracker, shift, stop + shift)
+
+
+def _about(part: _Part) -> dict[str, Any]:
+    """Entry of run.json: the file, its samples in the run and its own, and what was found."""
+    left_out, slips = part.of.found["left_out_samples"], part.of.found["phase_slips"]
+    return {
+        "file": str(part.log.path),
+        "sha256": part.sha256,
+        "first": part.first,
+        "stop": part.stop,
+        "first_in_file": part.of.source.first,
+        "left_out_samples": left_out,
+        "phase_slips": slips,
+        "part": part.of.found.get("part"),
+    }
+
+
+def _span(part: _Part) -> RecordedSpan:
+    log = part.log
+    times = [log.origin_s + sample / log.rate_hz for sample in (log.first, part.stop - part.shift)]
+    return RecordedSpan(log.path, log.clock_kind, *times)
+
+
+def _named(event: Event, part: _Part) -> Event:
+    """The event of a recording in the numbers of the run."""
+    name = part.log.path.name
+    message = Message("in {recording}: {event}", recording=name, event=event)
+    return replace(event, sample=event.sample + part.shift, message=message)

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 def of_drift(drift: Drift, lines: Lines) -> dict[str, Any]:
     """Entries on a drift of the machine within the recording: at the lines where it is significant, or the clearest."""
-    if not drift.found:
+    if not drift.significant:
         return {"found": False, "lines": []}
     shown = drift.lines.copy()
     if not shown.any():

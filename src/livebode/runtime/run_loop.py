@@ -42,7 +42,7 @@ class RunLoop:
     about
         Additional entries of run.json.
     segments
-        Settings of a record in segments; None for a record in one piece.
+        Settings of a record with a journal; None for a record that is written at once.
     """
 
     def __init__(

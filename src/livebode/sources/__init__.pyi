@@ -12,9 +12,12 @@ from livebode.sources.extras import missing as missing
 from livebode.sources.formats import HEAD_BYTES as HEAD_BYTES
 from livebode.sources.formats import Format as Format
 from livebode.sources.formats import no_frames as no_frames
+from livebode.sources.formats import open_file as open_file
 from livebode.sources.formats import read_head as read_head
 from livebode.sources.log import Log as Log
 from livebode.sources.opening import UNEVEN as UNEVEN
+from livebode.sources.opening import even_or_uneven_log as even_or_uneven_log
+from livebode.sources.opening import log_of as log_of
 from livebode.sources.opening import open_log as open_log
 from livebode.sources.recording import COLUMNS_MAX as COLUMNS_MAX
 from livebode.sources.recording import Chunk as Chunk
@@ -29,5 +32,5 @@ from livebode.sources.steps import exact_rate_hz as exact_rate_hz
 from livebode.sources.timing import Timing as Timing
 from livebode.sources.uneven import ClockGroup as ClockGroup
 from livebode.sources.uneven import UnevenLog as UnevenLog
-from livebode.sources.uneven import open_uneven as open_uneven
+from livebode.sources.uneven import uneven_log_of as uneven_log_of
 from livebode.sources.units import split_unit as split_unit

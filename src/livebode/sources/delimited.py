@@ -181,6 +181,7 @@ class DelimitedRecording(Recording):
     """A table in a text file. Its length is known only after reading."""
 
     format: ClassVar[str] = "csv"
+    named_by_file: ClassVar[bool] = True
 
     def __init__(self, path: Path) -> None:
         super().__init__(path)

@@ -11,7 +11,6 @@ from pathlib import Path
 from livebode.core import LivebodeError, RecordingError
 from livebode.locations import Location, shared_copy
 from livebode.plugins import loaded, tables, wings_left_out
-from livebode.sources.naming import NAMED_BY_FILE, without_file
 from livebode.sources.recording import Recording, contained, located
 
 HEAD_BYTES = 1024
@@ -122,7 +121,7 @@ def all_formats() -> list[Format]:
     return [format_ for table in reversed(tables("readers")) for format_ in table]
 
 
-def open_recording(place: Location, dbc: Path | None = None) -> Recording:
+def open_file(place: Location, dbc: Path | None = None) -> Recording:
     """Open `place` with the format that its content has; `dbc` defines the signals in CAN frames.
 
     Raises
@@ -146,11 +145,9 @@ def open_recording(place: Location, dbc: Path | None = None) -> Recording:
 
 def _with_short_names(recording: Recording) -> Recording:
     """Names that contain that of the file, as dSPACE writes them, have an alias that other files have too."""
-    if recording.format not in NAMED_BY_FILE:
-        return recording
-    file, columns = recording.place.name, []
+    columns = []
     for column in recording.columns:
-        short = without_file(column.name, file)
+        short = recording.without_file(column.name)
         aliases = column.aliases if short == column.name else (*column.aliases, short)
         columns.append(replace(column, aliases=aliases))
     recording.columns = tuple(columns)

@@ -27,6 +27,7 @@ class Hdf5Recording(Recording):
     """An HDF5 file. Links into other files are not followed."""
 
     format: ClassVar[str] = "hdf5"
+    named_by_file: ClassVar[bool] = True
 
     def __init__(self, path: Path) -> None:
         super().__init__(path)
@@ -140,6 +141,7 @@ class Matlab73Recording(Recording):
     """A v7.3 file; paths such as rec.Y(3).Data lead into structs, numbered from 1."""
 
     format: ClassVar[str] = "mat"
+    named_by_file: ClassVar[bool] = True
 
     def __init__(self, path: Path) -> None:
         super().__init__(path)

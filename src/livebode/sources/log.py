@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from livebode.core import Block, Channel, ClockKind, LivebodeError, QuantityKind, RecordingError, UsageError
 from livebode.locations import Location
 from livebode.sources.expressions import Expression, computed_blocks
-from livebode.sources.naming import NAMED_BY_FILE, explained, found_channel, resolve, without_file
+from livebode.sources.naming import explained, found_channel, resolve
 from livebode.sources.recording import Chunk, Column, Recording, Skipped, guarded, located, stacked
 from livebode.sources.timing import Clock, Timing
 
@@ -261,7 +261,7 @@ class Log:
 
     def shared_name(self, name: str) -> str:
         """The name without that of the file, if it still means the same: recordings of a series have it in common."""
-        short = without_file(name, self.path.name) if self.format in NAMED_BY_FILE else name
+        short = self._recording.without_file(name)
         return short if short == name or (self.has(short) and self._means(short) == self._means(name)) else name
 
     def _means(self, name: str) -> set[str]:

@@ -84,6 +84,7 @@ class MatlabRecording(Recording):
     """A v5 file. A matrix, and what is in a struct, has to fit in memory; a vector does not."""
 
     format: ClassVar[str] = "mat"
+    named_by_file: ClassVar[bool] = True
 
     def __init__(self, path: Path) -> None:
         super().__init__(path)

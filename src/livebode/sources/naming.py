@@ -1,19 +1,17 @@
-"""Which column a name means."""
+"""Which column a name means, and which columns belong together."""
 
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from pathlib import PurePath
 
 from livebode.core import RecordingError, nearest_name
 from livebode.sources.expressions import Expression, ExpressionSyntaxError, parse_expression
-from livebode.sources.recording import Column, Skipped
+from livebode.sources.recording import Column, Recording, Skipped
 from livebode.sources.units import split_unit
 
-NAMED_BY_FILE = ("mat", "csv", "parquet", "arrow", "npz", "hdf5")
-"""Formats of programs that name a variable as the file; elsewhere the beginning of a name is a topic or a group."""
 _WORD = re.compile(r"[\w.]+")  # without anything that computes
 
 
@@ -55,15 +53,6 @@ def resolve(name: str, columns: Sequence[Column], everything: Sequence[Column]) 
     raise RecordingError(
         "channel-unknown", f"there is no channel {name!r}", nearest_name(name, names), channel=name, channels=names
     )
-
-
-def without_file(name: str, file: str) -> str:
-    """The name without that of the file at its beginning, or at that of a channel in an expression.
-
-    >>> without_file("meas1.Y(3).Data - meas1.Y(4).Data", "meas1.mat"), without_file("meas10.speed", "meas1.mat")
-    ('Y(3).Data - Y(4).Data', 'meas10.speed')
-    """
-    return re.sub(rf"(?<![\w.]){re.escape(PurePath(file).stem)}\.(?=\w)", "", name)
 
 
 @contextmanager
@@ -109,3 +98,60 @@ def in_file(names: Sequence[str], columns: Sequence[Column]) -> list[str]:
 
 def plain_paths(column: Column) -> list[str]:
     return [name.replace("(1).", ".") for name in (column.name, *column.aliases)]
+
+
+def together(recording: Recording, channels: Sequence[str] | None, time: str | None) -> list[Column]:
+    """The columns of one group and length: of `channels`, of the time column, or with most of the file's values."""
+    everything = recording.columns
+    if channels:
+        named = {name: resolve(name, everything, everything) for name in in_file(channels, everything)}
+        names, asked = list(named), list(named.values())
+        check_groups(names, asked)
+        if len({column.samples for column in asked}) > 1:
+            lengths = ", ".join(f"{name!r} {column.samples}" for name, column in zip(names, asked))
+            raise RecordingError(
+                "lengths-differ",
+                f"the channels have different numbers of samples ({lengths})",
+                "name channels of one length",
+                path=str(recording.path),
+                argument="channels",
+                samples=[column.samples for column in asked],
+            )
+        group, length = asked[0].group, asked[0].samples
+    elif timed := [
+        column for column in everything if column.group and column.name in (time, split_unit(time or "")[0])
+    ]:
+        group, length = timed[0].group, timed[0].samples
+    else:
+        values: Counter[tuple[str, int | None]] = Counter()
+        for column in everything:
+            values[column.group, column.samples] += 1 if column.samples is None else column.samples
+        group, length = max(values, key=lambda shared: values[shared], default=("", 0))
+    if length is not None and length < 2:
+        raise RecordingError(
+            "channel-missing",
+            f"{recording.path} has no channel of at least 2 samples{reasons(recording)}",
+            "check that the recording is complete",
+            path=str(recording.path),
+        )
+    return [column for column in everything if (column.group, column.samples) == (group, length)]
+
+
+def check_groups(names: Sequence[str], columns: Sequence[Column]) -> None:
+    """RecordingError if the columns do not share their clock."""
+    groups = [column.group for column in columns]
+    if len(set(groups)) > 1:
+        listed = ", ".join(f"{name!r} in {group!r}" for name, group in zip(names, groups))
+        raise RecordingError(
+            "clocks-differ",
+            f"the channels are sampled by different clocks ({listed})",
+            "name channels of one group",
+            argument="channels",
+            groups=groups,
+        )
+
+
+def reasons(recording: Recording) -> str:
+    """What was skipped, for the error that no channel remains."""
+    listed = [f"{skipped.name!r}: {skipped.reason}" for skipped in recording.skipped[:3]]
+    return f" ({'; '.join(listed)})" if listed else ""

@@ -35,6 +35,7 @@ class NpzRecording(Recording):
     """A NumPy archive; the headers of all members are read at once, values only on request."""
 
     format: ClassVar[str] = "npz"
+    named_by_file: ClassVar[bool] = True
 
     def __init__(self, path: Path) -> None:
         super().__init__(path)

@@ -5,17 +5,17 @@ from __future__ import annotations
 import logging
 import os
 import re
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from livebode.core import ClockKind, QuantityKind, RecordingError, UsageError
 from livebode.locations import Url, location
-from livebode.sources.formats import open_recording
+from livebode.sources.formats import open_file
 from livebode.sources.log import Log, checked_block_samples
-from livebode.sources.naming import explained, in_file, resolve
+from livebode.sources.naming import explained, reasons, resolve, together
 from livebode.sources.recording import Column, Recording, guarded, located
 from livebode.sources.timing import (
     JITTER_MAX,
@@ -26,10 +26,9 @@ from livebode.sources.timing import (
     rate_in_column,
     rate_in_file,
 )
-from livebode.sources.units import split_unit
 
 UNEVEN = "recording.clocks-differ", "recording.time-jitter", "recording.time-irregular"
-"""Codes of the errors of `open_log` on a recording that `open_uneven` reads."""
+"""Codes of the errors of `log_of` on a recording of which `uneven_log_of` makes a log."""
 _logger = logging.getLogger(__name__)
 
 _FREQUENCY = re.compile(r"f|freq\w*|frequenz|hz|hertz", re.IGNORECASE)
@@ -97,6 +96,28 @@ def open_log(
     >>> log.rate_hz, log.channels[1]
     (1000.0, Channel(name='iq', unit='A', kind='current'))
     """
+    return log_of(
+        open_file(location(path), None if dbc is None else Path(dbc)),
+        rate_hz=rate_hz,
+        time=time,
+        channels=channels,
+        block_samples=block_samples,
+        kinds=kinds,
+        clock=clock,
+    )
+
+
+def log_of(
+    recording: Recording,
+    *,
+    rate_hz: float | None = None,
+    time: str | None = None,
+    channels: Sequence[str] | None = None,
+    block_samples: int = 65536,
+    kinds: Mapping[str, QuantityKind] | None = None,
+    clock: ClockKind | None = None,
+) -> Log:
+    """The log of a recording that `open_file` opened; parameters and errors as of `open_log`."""
     if rate_hz is not None and not (np.isfinite(rate_hz) and rate_hz > 0):
         raise UsageError(
             "out-of-range",
@@ -106,14 +127,29 @@ def open_log(
             value=rate_hz,
         )
     checked_block_samples(block_samples)
-    recording = open_recording(location(path), None if dbc is None else Path(dbc))
     with located(recording.place), explained(recording.skipped):
-        log = log_of(recording, rate_hz, time, channels, block_samples, kinds or {}, clock)
+        log = _log_of(recording, rate_hz, time, channels, block_samples, kinds or {}, clock)
     _logger.info("%s: %s, %d channels at %.9g Hz", log.path, log.format, len(log.channels), log.rate_hz)
     return log
 
 
-def log_of(
+def even_or_uneven_log(
+    recording: Recording, channels: Sequence[str], in_use: Sequence[str], *, time: str | None, **given: Any
+) -> Log:
+    """The same; a Log that is not `even` if the clock of `channels` jitters, or others `in_use` have other clocks."""
+    try:
+        log = log_of(recording, channels=channels, time=time, **given)
+        log.check_clocks(in_use)
+        return log
+    except RecordingError as error:
+        if error.code not in UNEVEN or time == "none":
+            raise
+    from livebode.sources.uneven import uneven_log_of
+
+    return uneven_log_of(recording, in_use, time=time, **given)
+
+
+def _log_of(
     recording: Recording,
     rate_hz: float | None,
     time: str | None,
@@ -122,7 +158,6 @@ def log_of(
     kinds: Mapping[str, QuantityKind],
     clock_kind: ClockKind | None,
 ) -> Log:
-    """The log of an open recording; parameters as in `open_log`."""
     columns = together(recording, channels, time)
     time_column, unit = find_time(columns, time)
     chosen = channels or [c.name for c in columns if c is not time_column and not c.temporal]
@@ -219,60 +254,3 @@ def rate_by_column(recording: Recording) -> tuple[float, str] | None:
     if column is None:
         return None
     return rate_in_column(column, guarded(recording.chunks([column], 1 << 16), recording.path, recording.format))
-
-
-def together(recording: Recording, channels: Sequence[str] | None, time: str | None) -> list[Column]:
-    """The columns of one group and length: of `channels`, of the time column, or with most of the file's values."""
-    everything = recording.columns
-    if channels:
-        named = {name: resolve(name, everything, everything) for name in in_file(channels, everything)}
-        names, asked = list(named), list(named.values())
-        check_groups(names, asked)
-        if len({column.samples for column in asked}) > 1:
-            lengths = ", ".join(f"{name!r} {column.samples}" for name, column in zip(names, asked))
-            raise RecordingError(
-                "lengths-differ",
-                f"the channels have different numbers of samples ({lengths})",
-                "name channels of one length",
-                path=str(recording.path),
-                argument="channels",
-                samples=[column.samples for column in asked],
-            )
-        group, length = asked[0].group, asked[0].samples
-    elif timed := [
-        column for column in everything if column.group and column.name in (time, split_unit(time or "")[0])
-    ]:
-        group, length = timed[0].group, timed[0].samples
-    else:
-        values: Counter[tuple[str, int | None]] = Counter()
-        for column in everything:
-            values[column.group, column.samples] += 1 if column.samples is None else column.samples
-        group, length = max(values, key=lambda shared: values[shared], default=("", 0))
-    if length is not None and length < 2:
-        raise RecordingError(
-            "channel-missing",
-            f"{recording.path} has no channel of at least 2 samples{reasons(recording)}",
-            "check that the recording is complete",
-            path=str(recording.path),
-        )
-    return [column for column in everything if (column.group, column.samples) == (group, length)]
-
-
-def check_groups(names: Sequence[str], columns: Sequence[Column]) -> None:
-    """RecordingError if the columns do not share their clock."""
-    groups = [column.group for column in columns]
-    if len(set(groups)) > 1:
-        listed = ", ".join(f"{name!r} in {group!r}" for name, group in zip(names, groups))
-        raise RecordingError(
-            "clocks-differ",
-            f"the channels are sampled by different clocks ({listed})",
-            "name channels of one group",
-            argument="channels",
-            groups=groups,
-        )
-
-
-def reasons(recording: Recording) -> str:
-    """What was skipped, for the error that no channel remains."""
-    listed = [f"{skipped.name!r}: {skipped.reason}" for skipped in recording.skipped[:3]]
-    return f" ({'; '.join(listed)})" if listed else ""

@@ -19,6 +19,7 @@ class ParquetRecording(Recording):
     """A Parquet file that livebode wrote, read one row group after the other; `samples` is in its footer."""
 
     format: ClassVar[str] = "parquet"
+    named_by_file: ClassVar[bool] = True
 
     def __init__(self, path: Path) -> None:
         super().__init__(path)

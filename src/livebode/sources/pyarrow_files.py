@@ -26,6 +26,7 @@ class ForeignParquetRecording(Recording):
     """A Parquet file; `samples` is in its footer."""
 
     format: ClassVar[str] = "parquet"
+    named_by_file: ClassVar[bool] = True
 
     def __init__(self, path: Path) -> None:
         super().__init__(path)
@@ -48,6 +49,7 @@ class ArrowRecording(Recording):
     """An Arrow IPC file or stream; the number of samples is known only after reading."""
 
     format: ClassVar[str] = "arrow"
+    named_by_file: ClassVar[bool] = True
 
     def __init__(self, path: Path) -> None:
         super().__init__(path)

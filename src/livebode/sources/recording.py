@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
@@ -72,6 +73,8 @@ class Recording(ABC):
     """
 
     format: ClassVar[str]
+    named_by_file: ClassVar[bool] = False
+    """Whether programs write the file's name before that of a variable; elsewhere that place is a topic or a group."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -91,9 +94,22 @@ class Recording(ABC):
         """Where the recording is, for its user: its path or URL."""
         return self.path if self.copy is None else self.copy.url
 
+    def without_file(self, name: str) -> str:
+        """The name of a channel or an expression without that of the file, as dSPACE writes it."""
+        return _without_prefix(name, self.place.stem) if self.named_by_file else name
+
     @abstractmethod
     def chunks(self, columns: Sequence[Column], rows: int) -> Iterator[Chunk]:
         """The values of `columns` (one common length) from the first to the last, about `rows` at a time."""
+
+
+def _without_prefix(name: str, prefix: str) -> str:
+    """The name without the prefix at its beginning, or at that of a channel in an expression.
+
+    >>> _without_prefix("meas1.Y(3).Data - meas1.Y(4).Data", "meas1"), _without_prefix("meas10.speed", "meas1")
+    ('Y(3).Data - Y(4).Data', 'meas10.speed')
+    """
+    return re.sub(rf"(?<![\w.]){re.escape(prefix)}\.(?=\w)", "", name)
 
 
 @contextmanager

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,12 +12,9 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Floats
 from livebode.core import Block, Channel, ClockKind, QuantityKind, RecordingError, UsageError, clock_kind_of
-from livebode.locations import Url, location
 from livebode.sources.expressions import Expression
-from livebode.sources.formats import open_recording
 from livebode.sources.log import Log
-from livebode.sources.naming import found_channel, resolve
-from livebode.sources.opening import together
+from livebode.sources.naming import found_channel, resolve, together
 from livebode.sources.recording import Column, Recording, Skipped, guarded, located, stacked
 from livebode.sources.resample import Resampler
 from livebode.sources.stamps import Stamps, stamps_of
@@ -45,7 +40,7 @@ class ClockGroup:
 
 
 class UnevenLog(Log):
-    """A recording whose channels are sampled at times of their own. Created by `open_uneven`.
+    """A recording whose channels are sampled at times of their own. Created by `uneven_log_of`.
 
     Its samples are read by `pieces`, at their times. Numbers of samples, the rate and `blocks` are those of a common
     grid that begins with the first sample of the reference: the samples of `blocks` are interpolated, good enough to
@@ -239,22 +234,23 @@ def _exact(time: NDArray[Any]) -> NDArray[Any]:
     return time.astype(np.int64, copy=False) if time.dtype.kind in "iub" else time
 
 
-def open_uneven(
-    path: str | os.PathLike[str] | Url,
+def uneven_log_of(
+    recording: Recording,
     channels: Sequence[str],
     *,
     rate_hz: float | None = None,
     time: str | None = None,
-    dbc: str | os.PathLike[str] | None = None,
     block_samples: int = 65536,
     kinds: Mapping[str, QuantityKind] | None = None,
     clock: ClockKind | None = None,
 ) -> UnevenLog:
-    """Open a recording whose channels have clocks of their own, or a clock that jitters.
+    """The log of a recording whose channels have clocks of their own, or a clock that jitters.
 
     Parameters
     ----------
-    path, time, dbc, block_samples, kinds, clock
+    recording
+        As `open_file` returns it.
+    time, block_samples, kinds, clock
         As for `open_log`.
     channels
         Channels in use, the reference first; their common time is what is read. If none is named, those that `open_log`
@@ -268,7 +264,6 @@ def open_uneven(
         Where `open_log` does so, except that a clock may have any increasing times; or if the channels have no common
         time.
     """
-    recording = open_recording(location(path), None if dbc is None else Path(dbc))
     with located(recording.place):
         everything = recording.columns
         for name in channels:

@@ -1,4 +1,4 @@
-"""The kind of estimate of this wing, with its rules."""
+"""The kind of estimate of this wing, with its rules, and what the wing adds to the page of a run."""
 
 from collections.abc import Mapping
 
@@ -11,9 +11,11 @@ ESTIMATES: Mapping[str, Mapping[str, str]] = {
         "fit": "livebode_matrix.run_fit:fit_matrix_run",
         "estimate": "livebode_matrix.response_matrix:ResponseMatrix",
         "recording": "livebode_matrix.response_matrix:examined_matrix",
-        "draw": "livebode_matrix.terminal:drawing_matrix",
+        "draw": "livebode_matrix.terminal:draw_matrix",
         "show": "livebode_matrix.terminal:show_matrix",
-        "page": "livebode.dashboard.matrix_view:views_of_matrix",
+        "page": "livebode.dashboard.run_feed:views_of_matrix",
         "export": "livebode.cli.export_command:matrices",
     }
 }
+PAGES: Mapping[str, str] = {"matrix": "livebode_matrix.page:MatrixPage"}
+"""What it adds to the page of a run."""

@@ -6,28 +6,23 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from livebode.cli import can_draw, one_drawing_at_a_time, show_monitoring, tell_how_to_draw, tracked_amount
-from livebode.configuration import Axis
 from livebode.core import MatrixResponses
 from livebode.locations import original
-from livebode.runtime import Draw, Outcome
+from livebode.runtime import Outcome
 
 if TYPE_CHECKING:
     from livebode_matrix.response_matrix import ResponseMatrix
 
 
-def drawing_matrix(axis: Axis) -> Draw:
-    """A function that draws the bode.png and singular-values.png of a matrix run, if Matplotlib is installed."""
+def draw_matrix(estimate: ResponseMatrix, into: Path) -> None:
+    """Draw bode.png and singular-values.png of a matrix run, if Matplotlib is installed."""
+    responses = estimate.drawn or estimate.newest
+    if responses is None or not can_draw():
+        return
+    from livebode.pictures import save_matrix_pictures
 
-    def draw(estimate: ResponseMatrix, into: Path) -> None:
-        responses = estimate.drawn or estimate.newest
-        if responses is None or not can_draw():
-            return
-        from livebode.pictures import save_matrix_pictures
-
-        with one_drawing_at_a_time():
-            save_matrix_pictures(responses, into, title=axis.source.title)
-
-    return draw
+    with one_drawing_at_a_time():
+        save_matrix_pictures(responses, into, title=estimate.axis.source.title)
 
 
 def show_matrix(outcome: Outcome) -> None:
@@ -59,9 +54,9 @@ def matrix_lines(newest: MatrixResponses) -> list[str]:
                 lines.append(f"{name}  not valid at any line")
                 continue
             size = abs(entry.value[-1, valid])
-            at = int(size.argmax())
-            bound = entry.bound(2.0)[-1, valid][at]
+            peak_index = int(size.argmax())
+            bound = entry.bound(2.0)[-1, valid][peak_index]
             around = f" ± {bound:.2g}" if bound == bound else ", bound not known yet"
-            peak = f"largest {size[at]:.4g}{around} at {entry.lines.frequency_hz[valid][at]:g} Hz"
+            peak = f"largest {size[peak_index]:.4g}{around} at {entry.lines.frequency_hz[valid][peak_index]:g} Hz"
             lines.append(f"{name}  valid at {valid.sum()} of {valid.size} lines, {peak}")
     return lines

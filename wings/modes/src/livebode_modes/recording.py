@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from livebode.arrays import Floats
-from livebode.configuration import Axis, open_recording, with_shared_names
+from livebode.configuration import Axis
 from livebode.core import UsageError, needing
 from livebode.preparation import beginnings, chosen_part
 from livebode.runtime import Destination, ExaminedRecording, dated, of_log
@@ -48,11 +50,10 @@ def proposed_band(y: Floats, rate_hz: float) -> tuple[float, float]:
 _SEARCHED = 1 << 20  # samples of each output, for the default of the band
 
 
-def examined_outputs(axis: Axis, to: Destination) -> ExaminedRecording:  # noqa: ARG001 - it is tracked at once
-    """Open a recording."""
-    opened = open_recording(axis)
-    axis = with_shared_names(axis, opened)
-    log = output_only_part(axis, opened)
+def examined_outputs(axis: Axis, logs: Sequence[Log], to: Destination) -> ExaminedRecording:  # noqa: ARG001
+    """A recording, which is tracked at once."""
+    (log,) = logs
+    log = output_only_part(axis, log)
     estimate = OutputOnly(axis, output_only_settings(axis, log))
     log = log.naming(estimate.channels)
     return ExaminedRecording(axis, log, estimate, of_log(log), log.clock_kind, dated(log))

@@ -6,7 +6,7 @@ ESTIMATES: Mapping[str, Mapping[str, str]] = {
     "output_only": {
         "estimate": "livebode_modes.estimate:OutputOnly",
         "recording": "livebode_modes.recording:examined_outputs",
-        "draw": "livebode_modes.terminal:drawing_modes",
+        "draw": "livebode_modes.terminal:draw_modes",
         "show": "livebode_modes.terminal:show_modes",
     }
 }

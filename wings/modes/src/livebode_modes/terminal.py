@@ -8,17 +8,19 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 from shutil import get_terminal_size
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from livebode.cli import can_draw, is_terminal, one_drawing_at_a_time, print_drawn, tell_how_to_draw
-from livebode.configuration import Axis
 from livebode.core import counted
 from livebode.locations import original
 from livebode.pictures import Canvas, Scale, clock, linear_ticks, written
-from livebode.runtime import Draw, Outcome
+from livebode.runtime import Outcome
 from livebode_modes.curves import ModeCurve, mode_curves
+
+if TYPE_CHECKING:
+    from livebode_modes.estimate import OutputOnly
 
 _WIDTH_MIN, _HEIGHT_MIN = 40, 10
 
@@ -76,36 +78,33 @@ def _limits(values: np.ndarray, share: float) -> tuple[float, float]:
 def _time_axis(across: Scale, begin: float, end: float, margin: int) -> list[str]:
     edge, numbers = ["─"] * across.cells, ""
     for tick in linear_ticks(begin, end, most=max(3, across.cells // 12)):
-        at, text = across.cell(tick), f"{tick:g}"
-        edge[at] = "┬"
-        first = min(max(at - (len(text) - 1) // 2, 0), across.cells - len(text))
+        cell, text = across.cell(tick), f"{tick:g}"
+        edge[cell] = "┬"
+        first = min(max(cell - (len(text) - 1) // 2, 0), across.cells - len(text))
         if first > len(numbers) or not numbers:
             numbers = numbers.ljust(first) + text
     return [" " * margin + f"└{''.join(edge)}┘", " " * (margin + 1) + numbers]
 
 
-def drawing_modes(axis: Axis) -> Draw:
-    """A function that draws modes.png into the directory of a run, if Matplotlib is installed."""
+def draw_modes(estimate: OutputOnly, into: Path) -> None:
+    """Draw modes.png into the directory of a run, if Matplotlib is installed."""
+    if not can_draw():
+        return
+    from livebode.records import RunRecord
+    from livebode_modes.picture import save_modes  # with Matplotlib half a second to import
 
-    def draw(_: object, into: Path) -> None:
-        if not can_draw():
-            return
-        from livebode.records import RunRecord
-        from livebode_modes.picture import save_modes  # with Matplotlib half a second to import
-
-        run = RunRecord.open(into, output_only=True)
-        title = f"{axis.source.title}: {axis.signals.output}"
-        with one_drawing_at_a_time():
-            save_modes(mode_curves(run), into, title=title, facts=_facts(run.summary))
-
-    return draw
+    run, axis = RunRecord.open(into, output_only=True), estimate.axis
+    assert axis is not None
+    title = f"{axis.source.title}: {axis.signals.output}"
+    with one_drawing_at_a_time():
+        save_modes(mode_curves(run), into, title=title, facts=_facts(run.summary))
 
 
 def _facts(summary: dict[str, Any]) -> str:
-    found = summary["found"]
+    facts = summary["found"]
     return (
-        f"from the output alone: {', '.join(found['outputs'])} · {counted(len(summary['modes']), 'mode')}, "
-        f"{counted(len(summary['harmonics']), 'harmonic')} · window {found['window'] / found['rate_hz']:.4g} s · "
+        f"from the output alone: {', '.join(facts['outputs'])} · {counted(len(summary['modes']), 'mode')}, "
+        f"{counted(len(summary['harmonics']), 'harmonic')} · window {facts['window'] / facts['rate_hz']:.4g} s · "
         "95 % bounds"
     )
 
@@ -132,14 +131,14 @@ def show_modes(outcome: Outcome) -> None:
 
 def mode_lines(summary: dict[str, Any]) -> list[str]:
     """The result of an output-only run in sentences."""
-    counts, found, speed = summary["counts"], summary["found"], summary["speed"]
-    low_hz, high_hz = found["band_hz"]
-    lines = [_mode(track) for track in summary["modes"]] or [_no_mode(found["window"] / found["rate_hz"])]
+    counts, facts, speed = summary["counts"], summary["found"], summary["speed"]
+    low_hz, high_hz = facts["band_hz"]
+    lines = [_mode(track) for track in summary["modes"]] or [_no_mode(facts["window"] / facts["rate_hz"])]
     lines += [_harmonic(track) for track in summary["harmonics"]]
     gaps = f", {counted(counts['gaps'], 'gap')}" if counts["gaps"] else ""
     lines.append(
-        f"{counted(counts['windows'], 'window')} of {found['window'] / found['rate_hz']:.4g} s, one every "
-        f"{found['hop'] / found['rate_hz']:.4g} s, {low_hz:.4g} … {high_hz:.4g} Hz, from {counts['samples']} samples"
+        f"{counted(counts['windows'], 'window')} of {facts['window'] / facts['rate_hz']:.4g} s, one every "
+        f"{facts['hop'] / facts['rate_hz']:.4g} s, {low_hz:.4g} … {high_hz:.4g} Hz, from {counts['samples']} samples"
         f"{gaps}: {speed['recorded_s']:.1f} s of output in {speed['run_s']:.2f} s"
     )
     return lines

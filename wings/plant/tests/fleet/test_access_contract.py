@@ -16,15 +16,15 @@ from nats.errors import Error, NoRespondersError
 from nats.js.errors import NoStreamResponseError, ServiceUnavailableError
 
 from livebode.core import ConfigError, FleetError
-from livebode_plant.fleet.credentials import write_credentials
+from livebode_plant.fleet.connection import write_credentials
 from livebode_plant.fleet.fleet_settings import FleetSettings, LogSection
 from livebode_plant.fleet.log import FleetLog
 from livebode_plant.fleet.message import message_id, write_message
-from livebode_plant.fleet.page_status import VIEW
 from livebode_plant.fleet.server import LogServer
 from livebode_plant.fleet.status import fleet_status
+from livebode_plant.fleet.status_message import VIEW
 from livebode_plant.fleet.subjects import ACTS, EDGE, LOG, LOG_STREAM, RESULTS, STATUS, STATUS_STREAM, axis_path
-from livebode_plant.page.fleet_alarms import FleetAct
+from livebode_plant.page.fleet_board import FleetAct
 from livebode_plant.page.fleet_feed import NatsFeed
 from tests.support.command import livebode
 from tests.support.fleet_runs import PARTITIONS, batch
@@ -164,15 +164,16 @@ def test_a_viewer_reads_the_status_and_changes_nothing(fleet: SecureFleet) -> No
 
     async def look(log: FleetLog) -> None:
         assert [one["owner"] for one in (await fleet_status(log, fleet.axes))["partitions"]] == ["a:1"]
+        impatient = log._connection.jetstream(timeout=SILENCE_S, prefix=log._api)  # the server does not answer
         for subject in (f"{STATUS}.0", f"{EDGE}.{own}", f"{LOG}.0.{own}", f"{RESULTS}.0", f"{ACTS}.acknowledge.{own}"):
             with pytest.raises((NoStreamResponseError, TimeoutError)):
-                await log._js.publish(subject, b"forged", timeout=SILENCE_S)
+                await impatient.publish(subject, b"forged")
         with pytest.raises((ServiceUnavailableError, TimeoutError)):
-            await log._js.purge_stream(STATUS_STREAM)
+            await impatient.purge_stream(STATUS_STREAM)
         with pytest.raises((ServiceUnavailableError, TimeoutError)):
-            await log._js.pull_subscribe(f"{STATUS}.0", stream=STATUS_STREAM)
+            await impatient.pull_subscribe(f"{STATUS}.0", stream=STATUS_STREAM)
         with pytest.raises((ServiceUnavailableError, TimeoutError)):
-            await log._js.get_msg(LOG_STREAM, 1)
+            await impatient.get_msg(LOG_STREAM, 1)
         for reply in (f"{LOG}.0.{own}", "$JS.API.STREAM.PURGE.STATUS"):
             await log._connection.publish("viewer.STREAM.INFO.STATUS", b"", reply=reply)
         await log._connection.flush()
