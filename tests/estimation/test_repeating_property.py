@@ -11,8 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from livebode.core import Lines
-from livebode.estimation.distortion import by_chance
-from livebode.estimation.verdicts import Judge
+from livebode.estimation.verdicts import Judge, by_chance
 from livebode.kernel import (
     ADDED,
     FORGOTTEN,

@@ -5,8 +5,8 @@ import pytest
 
 from livebode.core import Lines
 from livebode.excitation import find_lines, multisine, recognise
+from livebode.excitation._recognise import snr_db
 from livebode.excitation.significance import significant
-from livebode.excitation.snr import snr_db
 
 LINES = Lines(tuple(range(11, 251)), 2500, 2500.0)
 PERIOD = multisine(LINES)

@@ -8,9 +8,9 @@ from livebode.core._event import hand_over as hand_over
 from livebode.core._event import ignore as ignore
 from livebode.core._fast_length import fast_length as fast_length
 from livebode.core._frequency_response import PER_LINE as PER_LINE
+from livebode.core._frequency_response import PlotKind as PlotKind
 from livebode.core._frequency_response import Quantity as Quantity
 from livebode.core._frequency_response import decibels as decibels
-from livebode.core._kinds import PlotKind as PlotKind
 from livebode.core._loop import Loop as Loop
 from livebode.core._matrix_responses import CHANNELS_MAX as CHANNELS_MAX
 from livebode.core._matrix_responses import REASONS as REASONS

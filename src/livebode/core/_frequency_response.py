@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from livebode.arrays import Complex, Floats
-from livebode.core._kinds import PlotKind
 from livebode.core.lines import Lines, position, within
 from livebode.plugins import loaded
 
@@ -18,6 +17,10 @@ if TYPE_CHECKING:
     from xarray import Dataset
 
     from livebode.core._response import Responses
+
+
+PlotKind = Literal["bode", "nyquist", "nichols"]
+
 
 Quantity = Literal["plant", "open loop", "closed loop", "sensitivity"]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from livebode.core import Block, Lines, Response, SignalError, UsageError, needing
-from livebode.estimation.products import power
+from livebode.estimation.moments import power
 from livebode.estimation.welch_average import independent_windows
 
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Floats
 from livebode.core import GridError, Lines
-from livebode.estimation.products import power, scaled, times
+from livebode.estimation.moments import power, scaled, times
 from livebode.estimation.tracker_settings import DETECTION_LINES_MIN
 
 _BESIDE = 4  # detection lines on each side of a line, and at most as many beyond the outermost lines

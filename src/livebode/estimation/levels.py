@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from livebode.arrays import Complex, Floats
 from livebode.core import Lines, Stage, StatefulBase, f_quantile, meets_mains
 from livebode.estimation.detection import Interpolation
-from livebode.estimation.products import power
+from livebode.estimation.moments import power
 from livebode.estimation.spectra import after
 from livebode.estimation.tracker_settings import Settings
 from livebode.language import Message

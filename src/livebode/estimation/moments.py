@@ -14,6 +14,45 @@ from livebode.core import Stage, StatefulBase
 from livebode.kernel import MEANS, SCATTER, LineMoments, WeightSums
 
 
+def power(spectrum: Complex) -> Floats:
+    """|X|² without the square root that abs takes."""
+    # As all products here by real operations, which round in one way wherever a number is in an array.
+    return np.asarray(spectrum.real**2 + spectrum.imag**2)
+
+
+def magnitude(spectrum: Complex) -> Floats:
+    """|X|, from its power: the last bit of abs depends on the processor."""
+    return np.asarray(np.sqrt(power(spectrum)))
+
+
+def times(one: Complex, other: Complex) -> Complex:
+    """Product by real operations: NumPy's of complex numbers rounds otherwise in the last elements of an array."""
+    product = np.empty(np.broadcast_shapes(one.shape, other.shape), dtype=np.complex128)
+    product.real = one.real * other.real - one.imag * other.imag
+    product.imag = one.real * other.imag + one.imag * other.real
+    return product
+
+
+def scaled(one: Complex, factor: Floats | float) -> Complex:
+    """Product with a real number."""
+    product = np.empty(one.shape, dtype=np.complex128)
+    product.real, product.imag = one.real * factor, one.imag * factor
+    return product
+
+
+def divided(one: Complex, other: Complex) -> Complex:
+    """Quotient without overflow of |other|² (R. L. Smith, 1962), as NumPy divides where products are rounded."""
+    a, b, c, d = one.real, one.imag, other.real, other.imag
+    re, im = np.abs(c), np.abs(d)
+    wide, zero = re >= im, (re == 0) & (im == 0)
+    ratio = np.where(wide, d / c, c / d)
+    scale = 1 / np.where(wide, c + d * ratio, d + c * ratio)
+    quotient = np.empty(np.broadcast_shapes(one.shape, other.shape), dtype=np.complex128)
+    quotient.real = np.where(zero, a / re, np.where(wide, a + b * ratio, a * ratio + b) * scale)
+    quotient.imag = np.where(zero, b / re, np.where(wide, b - a * ratio, b * ratio - a) * scale)
+    return quotient
+
+
 @dataclass(frozen=True, eq=False)
 class Moments:
     """Weighted moments of line spectra, one row for each place in the period or each moment in time.

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Floats
 from livebode.core import Channel, Responses, Stage, StatefulBase
+from livebode.estimation.line_estimates import from_plant
 from livebode.estimation.line_stage import response_unit
 from livebode.estimation.local_polynomial import LocalPolynomial
-from livebode.estimation.quantities import from_plant
 from livebode.estimation.quotient import Quotient
 from livebode.estimation.spectra import after
 from livebode.estimation.tracker_settings import Settings

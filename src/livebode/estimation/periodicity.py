@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Flags, Floats
 from livebode.core import ANY_EXCITATION, Event, Lines, Stage, StatefulBase
-from livebode.estimation.products import power, times
+from livebode.estimation.moments import power, times
 from livebode.language import Message
 
 _CHANGED = 0.1  # of the input's power: a smaller change leaks less than it

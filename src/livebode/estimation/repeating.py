@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Flags, Floats
 from livebode.core import Block, Event, Lines, QuantityKind, Stage, step_of
-from livebode.estimation.distortion import by_chance
 from livebode.estimation.hum import SilentHum, may_disturb
 from livebode.estimation.levels import DistortionLevels
 from livebode.estimation.moments import PeriodMoments
@@ -20,7 +19,7 @@ from livebode.estimation.periods import PeriodCutter, Periods
 from livebode.estimation.silence_search import HumSpan, SilenceSearch, SilentStretch, updated
 from livebode.estimation.spectra import SpectraRows
 from livebode.estimation.tracker_settings import Settings
-from livebode.estimation.verdicts import HUM, KINDS, Verdict, judge_of, reason
+from livebode.estimation.verdicts import HUM, KINDS, Verdict, by_chance, judge_of, reason
 from livebode.kernel import ADDED, FORGOTTEN, NEWS, NEWS_GONE, PeriodSpectra, PeriodState, PeriodVerdicts
 from livebode.language import Message
 

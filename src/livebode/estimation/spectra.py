@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Floats
 from livebode.core import GridError, Lines, Stage, StatefulBase, UsageError
-from livebode.estimation.implausible import PlausibleRange
-from livebode.estimation.spikes import SpikeGate
+from livebode.estimation.spikes import PlausibleRange, SpikeGate
 from livebode.kernel import INSTRUCTION_SET_VARIABLE, SlidingDFT, instruction_set, instruction_sets
 
 _NONE = np.zeros(0, dtype=np.intp)

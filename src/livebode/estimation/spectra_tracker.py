@@ -28,10 +28,10 @@ from livebode.core import (
     hand_over,
     ignore,
 )
-from livebode.estimation.implausible import PlausibleRange
 from livebode.estimation.line_stage import LineStage
 from livebode.estimation.ripple import HopSpeed, ripple_power
 from livebode.estimation.spectra import SpectraRows, after
+from livebode.estimation.spikes import PlausibleRange
 from livebode.estimation.stream_estimator import StreamCounters, StreamEstimator
 from livebode.estimation.tracker_settings import Settings
 from livebode.language import Message

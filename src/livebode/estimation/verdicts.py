@@ -1,20 +1,21 @@
-"""Verdicts on lines from the mean over periods: distortion, mains hum, sensor steps."""
+"""Verdicts on lines from the mean over periods: distortion, estimated at detection lines, mains hum, sensor steps."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
+from math import gcd
 
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.arrays import Flags, Floats
-from livebode.core import Lines, QuantityKind
-from livebode.estimation.distortion import Distortion, reached
-from livebode.estimation.estimators import Role
-from livebode.estimation.mains import Neighbours, mains_of
+from livebode.arrays import Complex, Flags, Floats
+from livebode.core import Lines, QuantityKind, f_quantile
+from livebode.estimation.detection import Groups, Interpolation
+from livebode.estimation.hum import Neighbours, mains_of
+from livebode.estimation.moments import Moments, divided, power, times
 from livebode.estimation.spectra import after
-from livebode.estimation.tracker_settings import Settings
+from livebode.estimation.tracker_settings import Role, Settings
 from livebode.kernel import (
     REASONS,
     PeriodSpectra,
@@ -26,6 +27,160 @@ from livebode.kernel import (
     judge_periods,
 )
 from livebode.language import Message
+
+_INSIDE_MIN = 2  # smallest number of detection lines between the outermost lines for an estimate in the band
+_OUTSIDE = 6  # more of them on each side
+_COHERENT = 3.0
+"""Effect of a nonlinearity on a line of typical amplitude, relative to its effect on a detection line.
+
+A nonlinearity changes the gain at the lines (the describing function) and spreads the rest over the bins that it
+reaches. Of a sign of Gaussian velocity the gain has 2/π of the power, and the rest is spread over a band twice as wide:
+about 2 for a flat velocity (`python -m studies.repeating`). By Bussgang's theorem (1952) the change is proportional to
+the line's own amplitude in the signal that is distorted, and the rest is not: a line that is stronger in the output
+than the rms of the lines, as at a resonance, changes more in the same proportion.
+"""
+_STEPS_MARGIN = 3.0  # ratio to uniform rounding that the steps of a sensor may have at a few bins
+_POWERLESS = 1e-4
+_SMOOTH = 5  # detection lines over which the noise is averaged before it is compared with
+_CHANCE = 1e-4  # of noise alone to be significant in one verdict
+
+
+def reached(lines: Lines) -> NDArray[np.int64]:
+    """Bins without excitation on which distortion of these lines falls as it does on the lines, ascending.
+
+    Sums and differences of excited bins are multiples of their common divisor; of odd multiples an odd nonlinearity
+    reaches the odd ones, and an even one the even ones, where no line is. Empty where too few are between the lines.
+    """
+    bins = np.asarray(lines.bins)
+    unit = gcd(*lines.bins)
+    odd = bool(np.all(bins // unit % 2 == 1))
+    every = np.arange(unit, (lines.window + 1) // 2, 2 * unit if odd else unit)
+    free = np.setdiff1d(every, bins)
+    inside = free[(free > bins[0]) & (free < bins[-1])]
+    inside = np.intersect1d(inside, np.asarray(lines.quiet, dtype=np.int64))
+    if inside.size < _INSIDE_MIN:
+        return np.zeros(0, dtype=np.int64)
+    below, above = free[free < bins[0]][-_OUTSIDE:], free[free > bins[-1]][:_OUTSIDE]
+    return np.concatenate([below, inside, above]).astype(np.int64)
+
+
+class Distortion:
+    """Variance that distortion adds to numerator − Ĝ·denominator at the lines.
+
+    The residual of the mean over all periods, less the share of the noise, at the detection lines on which distortion
+    falls. It is interpolated over frequency twice, as it is and divided by |Ĝ|, and the larger result is used: sensor
+    steps are uniform in the output, friction is uniform in the torque. The effect on a line is taken as three times
+    that amplitude, and more at a line that is stronger in the output than the others.
+
+    Parameters
+    ----------
+    lines
+        The lines, of which `reached` must not be empty.
+    """
+
+    def __init__(self, lines: Lines) -> None:
+        at = np.asarray(lines.bins)
+        self.bins = reached(lines)
+        self.interpolation = Interpolation(at, self.bins)
+        self.groups = Groups(at, self.bins)
+        self.dof = float(self.groups.dof.min())
+
+    def repeats(
+        self, moments: Moments, pair: Complex, lines: slice, beside: slice, instrument: bool, steps: Floats
+    ) -> Repeats:
+        """What repeats without being a linear response.
+
+        Parameters
+        ----------
+        moments, pair
+            Moments at the lines and at `bins`, and their means of numerator and denominator, shape (2, rows, bins).
+        lines, beside
+            The places of the lines and of `bins` in these.
+        instrument
+            Whether the reference is the excitation, so that a bin at which it has power is excited.
+        steps
+            Possible variance of the sensor steps, shape (rows, lines). They do not change the gain, because the other
+            lines act as dither, so the factor of three does not apply to them.
+        """
+        numerator, denominator = pair
+        ratio = divided(numerator[:, lines], denominator[:, lines])
+        model = self.interpolation.at(ratio)
+        mean = power(numerator[:, beside] - times(model, denominator[:, beside]))
+        scatter = replace(moments, scatter=moments.scatter[:, :, beside]).unexplained(model)
+        noise = scatter / moments.weights.unbiased[:, np.newaxis] * moments.weights.of_mean[:, np.newaxis]
+        if instrument:
+            reference = moments.power[0]
+            excited = reference[:, beside] > _POWERLESS * _mean(reference[:, lines])
+            mean = np.where(excited, np.nan, mean)
+        as_output = self.groups.at(mean - noise)
+        as_input = self.groups.at((mean - noise) / power(model)) * power(ratio)
+        found = np.maximum(np.fmax(as_output, as_input), 0.0) + 0.0  # which zero a maximum is, is not specified
+        strength = power(numerator[:, lines])
+        stronger = np.maximum(strength / _mean(strength), 1.0)
+        coherent = (_COHERENT**2 * stronger - 1) * np.maximum(found - _STEPS_MARGIN * steps, 0.0)
+        known = np.isfinite(mean) & np.isfinite(noise)
+        over = _over_noise(mean, noise, known)
+        variance = _share(over)[:, np.newaxis] * (found + coherent)
+        return Repeats(variance, over, np.count_nonzero(known, axis=1), moments.weights.dof)
+
+
+@dataclass(frozen=True, eq=False)
+class Repeats:
+    """Result of `Distortion`, one row for each mean over periods.
+
+    Attributes
+    ----------
+    variance
+        Shape (rows, lines).
+    over_noise
+        Power that repeats over that of the noise beside it, mean over the detection lines that are known, (rows,).
+    known, dof
+        Number of these, and degrees of freedom of the noise at one of them, (rows,).
+    """
+
+    variance: Floats
+    over_noise: Floats
+    known: NDArray[np.int64]
+    dof: Floats
+
+
+def _mean(rows: Floats) -> Floats:
+    return np.asarray(np.ascontiguousarray(rows).mean(axis=1, keepdims=True))
+
+
+def _over_noise(mean: Floats, noise: Floats, known: NDArray[np.bool_]) -> Floats:
+    """Power that repeats over that of the noise beside it, mean over the detection lines that are known, (rows,)."""
+    smooth = _summed(np.where(known, noise, 0.0)) / _summed(known.astype(np.float64))
+    ratio = np.divide(mean, smooth, out=np.full(mean.shape, np.inf), where=smooth > 0)
+    if known.all():
+        return np.asarray(ratio.mean(axis=1))
+    return np.array([row[at].mean() if at.any() else 0.0 for row, at in zip(ratio, known)])
+
+
+def _summed(rows: Floats) -> Floats:
+    """Sum over five neighbouring detection lines, fewer at the ends."""
+    padded = np.pad(rows, ((0, 0), (_SMOOTH // 2, _SMOOTH // 2)))
+    shifted = (padded[:, at : at + rows.shape[1]] for at in range(_SMOOTH))
+    return np.asarray(sum(shifted, start=np.zeros_like(rows)))
+
+
+def _share(over_noise: Floats) -> Floats:
+    """Significance of the repeating part: the square of its share of the total power, 0 … 1.
+
+    Squared, so that noise that repeats by chance widens a bound by at most a few percent.
+    """
+    return np.where(over_noise > 0, np.fmax(0.0, 1 - 1 / over_noise) ** 2, 0.0)
+
+
+@lru_cache(maxsize=1024)
+def by_chance(known: int, dof: float) -> float:
+    """What noise alone exceeds over itself with a probability of 1e-4: a quantile of the F distribution.
+
+    Of as many detection lines as the noise is averaged over; the mean over more of them exceeds it less often.
+    """
+    independent = 2 * min(known, _SMOOTH)
+    return f_quantile(_CHANCE, independent, independent * dof)
+
 
 Reason = tuple[Message, dict[str, float]]
 

@@ -2,7 +2,6 @@ from livebode.excitation._chirp import Sweep as Sweep
 from livebode.excitation._chirp import chirp as chirp
 from livebode.excitation._chirp import chirp_lines as chirp_lines
 from livebode.excitation._extent import extent as extent
-from livebode.excitation._medians import medians as medians
 from livebode.excitation._multisine import Phases as Phases
 from livebode.excitation._multisine import each as each
 from livebode.excitation._multisine import multisine as multisine
@@ -17,6 +16,7 @@ from livebode.excitation._recognise import Excitation as Excitation
 from livebode.excitation._recognise import lines_of_window as lines_of_window
 from livebode.excitation._recognise import recognise as recognise
 from livebode.excitation.blocks import cut as cut
+from livebode.excitation.blocks import medians as medians
 from livebode.excitation.low_crest import crest_between_samples as crest_between_samples
 from livebode.excitation.low_crest import low_crest_phases as low_crest_phases
 from livebode.excitation.odd import check_band as check_band

@@ -1,25 +1,58 @@
-"""Detection of the excitation in a recording."""
+"""Detection of the excitation in a recording, with its crest factor and signal-to-noise ratio."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from livebode.arrays import Flags, Floats
 from livebode.core import Lines, SignalError, UsageError, step_of
 from livebode.excitation._extent import extent
 from livebode.excitation.blocks import cut, spectra
-from livebode.excitation.crest import peak_and_rms
 from livebode.excitation.doubtful import refuse_if_doubtful, with_lines_beside, without_junk
 from livebode.excitation.hum import separate_hum
 from livebode.excitation.period import find_period
 from livebode.excitation.prepare import checked, clipped, filled
 from livebode.excitation.significance import FLOOR_DB, GAP_DB, BinClasses, find_lines
 from livebode.excitation.slips import Slip, find_slips, realigned
-from livebode.excitation.snr import snr_db
 from livebode.excitation.transient import leading, unlike
+
+
+def peak_and_rms(period: NDArray[np.float64]) -> tuple[float, float]:
+    """Largest magnitude and rms of the AC part of one period, shape (samples,); their quotient is the crest factor.
+
+    The offset is ignored: it neither excites nor can be separated from that of the sensor. Between samples the signal
+    may have higher peaks (negligible for lines far below the Nyquist frequency).
+
+    >>> peak_and_rms(np.array([4.0, 2.0, 4.0, 2.0]))
+    (1.0, 1.0)
+    """
+    ac = period - period.mean()
+    return float(np.max(np.abs(ac))), float(np.sqrt(np.mean(ac**2)))
+
+
+def snr_db(periods: NDArray[np.complex128]) -> NDArray[np.float64]:
+    """Power of each line over the noise of one period, 10·log10(|mean Y|²/var Y) in dB, shape (lines,).
+
+    Parameters
+    ----------
+    periods
+        Spectra of the steady periods at the lines, shape (periods, lines).
+
+    Notes
+    -----
+    The variance is that between periods, Σ|Y_m − Ȳ|²/(M − 1). The remaining noise of the mean biases the power
+    upwards: a line without signal shows −10·log10(M) dB on average. NaN with one period; inf where nothing varies.
+    """
+    count = len(periods)
+    if count < 2:
+        return np.full(periods.shape[1], np.nan)
+    mean = periods.mean(axis=0)
+    variance = np.sum(np.abs(periods - mean) ** 2, axis=0) / (count - 1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(10 * np.log10(np.abs(mean) ** 2 / variance))
 
 
 @dataclass(frozen=True, eq=False)

