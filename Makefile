@@ -8,13 +8,15 @@ NODE    = node_modules/.package-lock.json
 export OPENBLAS_NUM_THREADS ?= 1
 # One more than there are processors: a test that waits, for a server or a child, leaves them to others.
 WORKERS ?= $(shell $(PYTHON) -c "import os; print((os.cpu_count() or 1) + 1)")
+# A file's tests share what they compute once; conftest.py has the files that take longest begin first.
+BY_FILE = -n $(WORKERS) --dist loadfile --no-loadscope-reorder
 WHEELS  = .venv-wheels
 # A Python that has the wheel of the stable ABI: the newest of pyenv, else that of the system.
 LATER_PYTHON ?= $(or $(lastword $(sort $(wildcard $(HOME)/.pyenv/versions/3.1[2-9].*/bin/python3))),python3.13)
 NATIVE  = $(shell find kernel native simulation CMakeLists.txt src/livebode/kernel src/livebode/simulation -name '*.[ch]' -o -name '*.cpp' -o -name CMakeLists.txt -o -name '*.cmake')
 C_SOURCES = $(shell find kernel native simulation src examples bench tests -name '*.[ch]' -o -name '*.cpp')
 
-.PHONY: help demo test test-changed mutations size pytest docs lint bench bench-compare release-check wheels test-abi3 bench-abi3 profiles lowest publishing outage peers studies repeating recognition uneven nonperiodic fit-bounds common-modes monitoring healthy temperature trends fuzz crash damage deletions archive-faults fleet-faults fleet-scale soak attacks screenshots system-packages catalogues lock clean
+.PHONY: help demo test test-changed durations mutations size pytest docs lint bench bench-compare release-check wheels test-abi3 bench-abi3 profiles lowest publishing outage peers studies repeating recognition uneven nonperiodic fit-bounds common-modes monitoring healthy temperature trends fuzz crash damage deletions archive-faults fleet-faults fleet-scale soak attacks screenshots system-packages catalogues lock clean
 
 help:            ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 20
@@ -47,12 +49,16 @@ $(VENV)/.compiled: $(BUILT)
 	touch $@
 
 pytest: $(BUILT) $(NODE) $(VENV)/.compiled
-	@$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal  # neighbouring tests share what they compute once
+	@$(BIN)/python -m pytest $(BY_FILE)
+
+durations: $(BUILT) $(NODE) $(VENV)/.compiled  ## every test, then the seconds of the longest in bench/history/test-seconds.csv
+	@$(BIN)/python -m pytest $(BY_FILE) --junitxml=build/tests.xml -o junit_family=xunit1
+	@$(BIN)/python -m tools.test_seconds build/tests.xml > bench/history/test-seconds.csv
 
 BASE ?=
 MUTATIONS ?= 20
 test-changed: $(BUILT)  ## the tests that what changed since a commit can concern (BASE=COMMIT; default: the last one)
-	@$(BIN)/python -m tools.changed_tests $(or $(BASE),HEAD) -n $(WORKERS) --dist worksteal
+	@$(BIN)/python -m tools.changed_tests $(or $(BASE),HEAD) $(BY_FILE)
 
 mutations: $(BUILT)  ## break 20 lines of the hull and of each wing at random: which does no test notice (hours; MUTATIONS=2: less)
 	for package in livebode $(notdir $(wildcard wings/*/src/*)); do $(BIN)/python -m tools.mutations $$package $(MUTATIONS) 1 || exit; done

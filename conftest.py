@@ -13,17 +13,21 @@ they make much that they keep to their end, and memory is there. A process that 
 more at its end: what tests import, or a run of several axes in the process freezes, would else not be freed, and
 nanobind in DuckDB prints a page of what is left.
 
+Processes of pytest-xdist run whole files, the longest first: none has a long one left when the others are at their end.
+
 A generated example has no time limit: on a busy computer it measures the neighbours.
 
 Ctrl-C reaches the processes that tests start. A shell lets what it starts in the background ignore it, and they would
 inherit that: a test would never see the end of a command.
 """
 
+import csv
 import gc
 import os
 import signal
 import sys
 import tempfile
+from collections import defaultdict
 from collections.abc import Generator, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -59,6 +63,15 @@ def pytest_configure(config: pytest.Config) -> None:
 
 def pytest_collection() -> None:
     gc.disable()
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    if hasattr(config, "workerinput"):
+        seconds: defaultdict[str, float] = defaultdict(float)
+        with (config.rootpath / "bench/history/test-seconds.csv").open(encoding="utf-8", newline="") as file:
+            for row in csv.DictReader(file):
+                seconds[row["file"]] += float(row["seconds"])
+        items.sort(key=lambda item: -seconds[item.nodeid.split("::")[0]])
 
 
 def pytest_collection_finish() -> None:

@@ -39,23 +39,23 @@ from livebode.core import Lines
 from livebode.excitation import multisine
 from livebode.simulation import BeltAxis, SimulatedAxis, Strokes
 from livebode_plant.archive.alone import handle_alone
-from livebode_plant.archive.archive_settings import ArchiveSettings, ClusterSection
-from livebode_plant.archive.clusters import Cluster, started
-from livebode_plant.archive.coordinator import Committer
-from livebode_plant.archive.distribution import Distribution
-from livebode_plant.archive.groups import RecordingGroups
-from livebode_plant.archive.job import Job
-from livebode_plant.archive.recording_places import (
+from livebode_plant.archive.archive_settings import ArchiveSettings, ClusterSection, Template
+from livebode_plant.archive.archived_recordings import (
     ArchivedRecording,
     RecordingPlace,
+    RecordingResults,
+    TrackedResult,
+    each_result,
     file_rows,
     find_places,
     longest_first,
+    lost,
 )
-from livebode_plant.archive.results import RecordingResults, TrackedResult, each_result, lost
-from livebode_plant.archive.tasks import handle, handle_one
-from livebode_plant.archive.template import Template
-from livebode_plant.lake import RUNS, Lake
+from livebode_plant.archive.clusters import Cluster, started
+from livebode_plant.archive.coordinator import Committer
+from livebode_plant.archive.distribution import Distribution, RecordingGroups
+from livebode_plant.archive.tasks import Job, handle, handle_one
+from livebode_plant.lake import TABLES, Lake
 
 WORKERS, RATE_HZ, WINDOW = 2, 4000.0, 400
 POOL_RATIO_MAX, LOOP_RATIO_MIN, KNOWN_S_MAX, MEMORY_MB_MAX = 1.05, 1.9, 5.0, 300
@@ -195,7 +195,7 @@ def known(folder: Path) -> None:
     lake.add_rows("files", file_rows(contents, {}))
     for first in range(0, KNOWN, 100):  # as an archive commits them, so that the lake has many small files
         rows = [{"content": content, "recipe": recipe} for _, content in contents[first : first + 100]]
-        lake.add_rows("runs", pa.Table.from_pylist(rows, schema=RUNS))
+        lake.add_rows("runs", pa.Table.from_pylist(rows, schema=TABLES["runs"].schema))
     program = [PROGRAM, "archive", "run", str(archive)]
     times = []
     for _ in range(3):

@@ -24,7 +24,7 @@ from livebode.core import Block
 from livebode.interface import write_examples
 from livebode.preparation import make_follower
 from livebode.runtime import Destination, SingleResponse, run
-from livebode_plant.fleet.fits_together import process_together
+from livebode_plant.fleet.alike_axes import process_together
 
 AXES, ROUNDS = 100, 3
 FITS_PER_S = 2

@@ -21,7 +21,7 @@ import numpy as np
 from bench.browser import chromium
 from livebode.analysis import Overview
 from livebode.core import Block, Lines, Parameters, Responses
-from livebode.dashboard import Dashboard, Hub, Serving
+from livebode.dashboard import Dashboard, Hub, ServerSettings
 from livebode.runtime import FitResults, RunControl, RunStarted, TrackerResults
 
 RATE_HZ, WINDOW, UPDATES_PER_S = 4000.0, 2000, 30.0
@@ -79,7 +79,7 @@ def publish(hub: Hub, made: Responses, stop: threading.Event, costs: list[float]
 
 def measured(seconds: float, lines: Lines, browsers: int) -> dict[str, float]:
     """Results of one run."""
-    dashboard, stop, costs = Dashboard(Serving("127.0.0.1", 0)), threading.Event(), list[float]()
+    dashboard, stop, costs = Dashboard(ServerSettings("127.0.0.1", 0)), threading.Event(), list[float]()
     hub = dashboard.hub("bench")
     found = {
         "bins": list(lines.bins), "quiet_bins": [], "window": WINDOW, "rate_hz": RATE_HZ, "quantity": "plant",

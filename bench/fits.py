@@ -19,7 +19,7 @@ from livebode.configuration import FitSection
 from livebode.core import PID, Lines, Loop, Responses
 from livebode.fitting import EvaluationGrid, Fitter, TwoMass, fit_each, two_masses
 from livebode.runtime import Fits
-from livebode_plant.fleet.fits_together import process_together
+from livebode_plant.fleet.alike_axes import process_together
 
 TARGET_US = 60.0
 RATE_HZ, AXES, TARGET_AXES, LIVE = 200, 16, 8, 32

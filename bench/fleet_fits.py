@@ -23,7 +23,8 @@ from bench.axes import TARGET_PERCENT, machine
 from livebode.configuration import Axis
 from livebode.core import Block
 from livebode.sources.live import Batch
-from livebode_plant.fleet.axis_stream import AxisStream, outputs_together
+from livebode_plant.fleet.alike_axes import outputs_together
+from livebode_plant.fleet.axis_stream import AxisStream
 from livebode_plant.fleet.message import write_message
 from livebode_plant.fleet.partition import RESULTS_S
 from livebode_plant.fleet.result_message import PendingResults

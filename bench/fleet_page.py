@@ -18,14 +18,11 @@ import time
 import numpy as np
 
 from bench.browser import chromium
-from livebode.dashboard import Dashboard, Serving
+from livebode.dashboard import Dashboard, ServerSettings
 from livebode_plant.fleet.status_message import ACTIVE, AxisName, PartitionNames, encode_names, encode_status
-from livebode_plant.page.fleet_alarms import FleetAct
-from livebode_plant.page.fleet_board import FleetBoard
-from livebode_plant.page.fleet_demo import DemoFleet
-from livebode_plant.page.fleet_feed import Hear
-from livebode_plant.page.fleet_pages import FleetSite, tiles_frame
-from livebode_plant.page.fleet_view import TICK_S, FleetView
+from livebode_plant.page.fleet_board import FleetAct, FleetBoard
+from livebode_plant.page.fleet_feed import DemoFleet, Hear
+from livebode_plant.page.fleet_pages import TICK_S, FleetView, tiles_frame
 
 _FRAMES = """async (seconds) => {
   const { tiles } = window.livebode, end = performance.now() + 1000 * seconds;
@@ -118,8 +115,8 @@ def board_cost(plant: Plant, seconds: int) -> None:
 
 def page_cost(plant: Plant, seconds: float) -> None:
     """Open the page, raise an alarm, scroll."""
-    dashboard = Dashboard(Serving("127.0.0.1", 0))
-    dashboard.show(FleetSite(FleetView(plant)))
+    dashboard = Dashboard(ServerSettings("127.0.0.1", 0))
+    dashboard.show(FleetView(plant))
     with dashboard, chromium() as browser:
         for words, viewport in (("desktop", (1440, 900)), ("telephone", (390, 844))):
             page = browser.new_page(viewport={"width": viewport[0], "height": viewport[1]})

@@ -24,7 +24,8 @@ import numpy as np
 from bench.fleet_loads import SAMPLES_100, SAMPLES_500, SPECTRA, AxisLoad
 from bench.fleet_path import LOAD, state_every_s
 from livebode.sources.live import Sequencer, SourceEvents
-from livebode_plant.fleet.axis_stream import AxisStream, stacked_together
+from livebode_plant.fleet.alike_axes import stacked_together
+from livebode_plant.fleet.axis_stream import AxisStream
 from livebode_plant.fleet.fleet_settings import LogSection
 from livebode_plant.fleet.log import FleetLog
 from livebode_plant.fleet.message import read_message
@@ -142,7 +143,7 @@ class MessageCosts:
                 stacks, outputs = stacked_together(streams[part])
                 tracked, pending = time.thread_time(), PendingResults()
                 for stack in stacks:
-                    at = [first + i for i in stack.at]
+                    at = [first + i for i in stack.indices]
                     pending.add_rows([keys[i] for i in at], [streams[i] for i in at], stack)
                 for i, output in outputs.items():
                     pending.add(keys[first + i], streams[first + i], output)

@@ -20,10 +20,16 @@ from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine
 from livebode.simulation import BeltAxis, Sensor, SimulatedAxis, Strokes
 from livebode_plant.fleet.fleet_settings import SinkSection
-from livebode_plant.fleet.log import StoredMessage
-from livebode_plant.fleet.result_message import ResultMessage
+from livebode_plant.fleet.reader import StoredMessage
+from livebode_plant.fleet.result_message import (
+    AxisFits,
+    AxisRows,
+    ResultMessage,
+    grid_of,
+    parameter_table,
+    response_table,
+)
 from livebode_plant.fleet.sink_tables import SinkTables
-from livebode_plant.fleet.wide_rows import AxisFits, AxisRows, grid_of, parameter_table, response_table
 from livebode_plant.lake import Lake
 
 RATE_HZ, WINDOW, LINES, HOP, TRACKED_S = 4000.0, 400, 7, 2000, 60.0
@@ -78,7 +84,7 @@ def messages(responses: Responses, axes: int, seconds: float) -> Iterator[Stored
                 name: getattr(own, name) * (1 + SCATTER * rng.standard_normal(own.value.shape)) for name in SCATTERED
             }
             own = replace(own, **scattered, time_s=number * EVERY_S + np.arange(count) / RESPONSES_PER_S)
-            parts.append(AxisRows(key, 1, number * count, own))
+            parts.append(AxisRows.of(key, 1, number * count, own))
             found = 1e5 * (1 + SCATTER * rng.standard_normal((count, PARAMETERS)))
             covariance = np.broadcast_to(1e4 * np.eye(2), (count, 2, 2)).copy()
             fitted = Parameters(

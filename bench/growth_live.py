@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from bench.monitoring_live import RATE_HZ, UNITS, at_hop, standing
 from livebode.configuration import Axis, RecordSection
 from livebode.core import Channel
-from livebode.dashboard import Dashboard, Hub, Serving
+from livebode.dashboard import Dashboard, Hub, ServerSettings
 from livebode.runtime import Destination, Document, Session, TrackerResults, live
 from livebode.sources.live import Address, Batch, LiveSource, SourceSettings
 
@@ -104,7 +104,7 @@ def run(
     logging.disable(logging.WARNING)  # thousands of losses
     axis = json.loads((folder / "axis.json").read_text()) | {"source": {"url": "tcp://127.0.0.1:1"}}
     found = at_hop(Axis.of(axis, "growth"), HOP).model_copy(update={"record": RecordSection(segment_s=segment_s)})
-    dashboard = Dashboard(Serving("127.0.0.1", 0))
+    dashboard = Dashboard(ServerSettings("127.0.0.1", 0))
     hubs = {f"x{i}": dashboard.hub(f"x{i}") for i in range(axes)}
     samples = np.load(folder / "samples.npy")  # one for all, so that it does not count as memory of an axis
     hub, waiting_max = iter(hubs.values()), max(MAILBOX_MAX, MAILBOXES_MAX // axes)

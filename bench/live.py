@@ -29,7 +29,7 @@ from bench.browser import chromium
 from bench.job import LINES, RATE_HZ, WINDOW, signals
 from livebode.configuration import Axis
 from livebode.core import Block, Channel, Responses
-from livebode.dashboard import Dashboard, Serving
+from livebode.dashboard import Dashboard, ServerSettings
 from livebode.runtime import Destination, Document, Session, Subscriber, TrackerResults
 from livebode.sources.live import Batch, LiveBlock, encode_layout, encode_samples
 
@@ -141,7 +141,7 @@ def measure(scenario: Scenario, seconds: float) -> dict[str, float]:
     names = [f"x{i}" for i in range(scenario.axes)]
     if not scenario.dashboard:
         return _measured(scenario, seconds, dict.fromkeys(names, ()), None)
-    dashboard = Dashboard(Serving("127.0.0.1", 0))
+    dashboard = Dashboard(ServerSettings("127.0.0.1", 0))
     hubs = {name: (dashboard.hub(name),) for name in names}
     with dashboard:
         return _measured(scenario, seconds, hubs, dashboard.url)

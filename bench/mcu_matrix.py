@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from bench.mcu import count
 from livebode.core import Block, Lines
-from livebode.mimo import MatrixExcitation
+from livebode.excitation import MatrixExcitation
 from livebode.simulation import GantryLoop
 from tools.firmware import M4F, M7, ROOT, Core, missing, run
 

@@ -15,8 +15,8 @@ import numpy as np
 from bench.work import side_by_side
 from livebode.core import Block, Lines
 from livebode.estimation import Settings, Tracker
+from livebode.excitation import MatrixExcitation
 from livebode.kernel import SlidingDFT
-from livebode.mimo import MatrixExcitation
 from livebode_matrix import MatrixSettings, MatrixTracker
 
 RATE_HZ, WINDOW, HOP, SECONDS_EACH = 4000.0, 400, 20, 2.0

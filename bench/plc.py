@@ -11,10 +11,8 @@ import argparse
 import numpy as np
 
 from livebode.core import Lines
-from livebode.excitation import multisine as multisine_period
-from livebode.excitation import schroeder_phases
+from livebode.excitation import function_block, multisine, schroeder_phases
 from livebode.kernel import SlidingDFT
-from livebode.structured_text import multisine
 from livebode_drives.structured_text.sliding_dft import sliding_dft
 from tests.twins.sliding import TwinDFT
 from tools.structured_text import Instance, Machine
@@ -92,8 +90,8 @@ def excitation(count: int) -> str:
     """A row of the table of FB_Multisine: one period in a table, compared with the sum of its lines."""
     window = 100
     lines = Lines(tuple(range(1, count + 1)), window, RATE_HZ)
-    period = multisine_period(lines, 0.1)
-    played = Machine(multisine(period, rate_hz=RATE_HZ, limit=9.0)).instance("FB_Multisine")
+    period = multisine(lines, 0.1)
+    played = Machine(function_block(period, rate_hz=RATE_HZ, limit=9.0)).instance("FB_Multisine")
     for _ in range(2 * window):
         ramp = played(enable=True)
     summed = Machine(sum_of_lines(lines, 0.1)).instance("FB_Sum")

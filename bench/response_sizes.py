@@ -19,11 +19,10 @@ from livebode.core import Lines, Responses
 from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine
 from livebode.records import RESPONSES, ColumnTable, as_batch
-from livebode.records.table_file import TableFile
+from livebode.records.segments.segment_writer import TableFile
 from livebode.simulation import BeltAxis, Sensor, SimulatedAxis, Strokes
 from livebode.tables import Table
-from livebode_plant.fleet.result_message import ResultMessage
-from livebode_plant.fleet.wide_rows import AxisRows, grid_of, response_table
+from livebode_plant.fleet.result_message import AxisRows, ResultMessage, grid_of, response_table
 from livebode_plant.lake.wide_responses import from_wide, to_wide, wide_options
 
 RATE_HZ, WINDOW, HOP, SECONDS = 4000.0, 400, 20, 60.0
@@ -72,7 +71,7 @@ def found_of(responses: Responses) -> dict[str, object]:
 def in_messages(responses: Responses) -> str:
     """Bytes of a response in a message of results of a partition with some axes, by form."""
     parts = [
-        AxisRows(f"hall.2.machine {i}.x", 1, 0, responses[EACH * i : EACH * (i + 1)]) for i in range(AXES_IN_MESSAGE)
+        AxisRows.of(f"hall.2.machine {i}.x", 1, 0, responses[EACH * i : EACH * (i + 1)]) for i in range(AXES_IN_MESSAGE)
     ]
     grids = {part.axis: grid_of(part.responses) for part in parts}
     rounded = len(ResultMessage(1, "worker:1", rows=response_table(parts), grids=grids).to_bytes())

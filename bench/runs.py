@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from bench.browser import chromium
-from livebode.dashboard import Dashboard, Serving
+from livebode.dashboard import Dashboard, ServerSettings
 from livebode.dashboard.run_catalogue import RunCatalogue
 from livebode.runtime import Destination, demo, demo_baseline
 from tools.run_copies import copy_run
@@ -49,7 +49,7 @@ def measured(directory: Path, runs: int, path: str, ready: str) -> tuple[float, 
     with chromium() as browser:
         page = browser.new_page(viewport={"width": 1440, "height": 900})
         page.goto("about:blank")
-        dashboard = Dashboard(Serving("127.0.0.1", 0))
+        dashboard = Dashboard(ServerSettings("127.0.0.1", 0))
         dashboard.view_all(directory)
         with dashboard:
             times = [waited(page, dashboard.url + path, ready.format(runs)) for _ in range(2)]

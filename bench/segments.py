@@ -27,7 +27,7 @@ import numpy as np
 
 from bench.job import LINES
 from livebode.core import Responses
-from livebode.dashboard import Dashboard, Past, Serving
+from livebode.dashboard import Dashboard, Past, ServerSettings
 from livebode.records import RESPONSES, RunRecord, SegmentLimits, Store, Thinning, as_batch, query
 from livebode.records.segments import shelf
 
@@ -82,7 +82,7 @@ def queried(path: Path) -> None:
 
 
 def viewed(path: Path) -> None:
-    dashboard = Dashboard(Serving("127.0.0.1", 0))
+    dashboard = Dashboard(ServerSettings("127.0.0.1", 0))
     dashboard.view(path)
     with dashboard, urllib.request.urlopen(dashboard.url) as page:
         page.read()

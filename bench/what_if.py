@@ -21,7 +21,7 @@ from bench.browser import chromium
 from bench.dashboard import RATE_HZ, WINDOW, responses
 from livebode.analysis import Overview
 from livebode.core import Lines
-from livebode.dashboard import Dashboard, Serving
+from livebode.dashboard import Dashboard, ServerSettings
 from livebode.runtime import RunControl, RunStarted
 
 FRAMES_MIN = 30.0
@@ -59,7 +59,7 @@ def frames(count: int, places: int, seconds: float) -> list[float]:
         "velocity": {"gain": 0.05, "integral_time_s": 0.2, "rate_hz": RATE_HZ},
         "position": {"gain": 1.0, "rate_hz": RATE_HZ / 2, "rate_divider": 2},
     }
-    dashboard, overview = Dashboard(Serving("127.0.0.1", 0)), Overview()
+    dashboard, overview = Dashboard(ServerSettings("127.0.0.1", 0)), Overview()
     hub = dashboard.hub("bench")
     with tempfile.TemporaryDirectory() as folder, dashboard, chromium() as browser:
         hub(RunStarted(Path(folder), {"found": found, "configuration": {"loop": loop}}, RunControl(), overview))

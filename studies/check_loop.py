@@ -1,4 +1,4 @@
-"""How often `livebode check-loop` finds a wrong word of the description, and how often it finds one in a right one.
+"""How often `livebode validate --loop` finds a wrong word of the description, and how often one in a right one.
 
 Run `python -m studies.check_loop --runs 400`. The axes are a belt axis, one with an encoder of few counts, cogging and
 friction, and one at another rate with correlated noise; on all of them the recorded torque has noise. Each word is

@@ -16,7 +16,7 @@ import numpy as np
 
 from livebode.configuration import LoopSection
 from livebode.core import Block, Lines
-from livebode.mimo import MatrixExcitation
+from livebode.excitation import MatrixExcitation
 from livebode.simulation import GantryLoop
 from livebode_control.loop_check.loop_check import LoopCheck, check_loop
 from livebode_control.loop_check.loop_equation import LoopSignals

@@ -15,12 +15,12 @@ from typing import Any
 import psutil
 
 from livebode.core import FleetError
-from livebode_plant.fleet.check import CheckResult, check_results
 from livebode_plant.fleet.demo import BLOCK_S, RATE_HZ, SimulatedMachines, write_simulated_fleet
 from livebode_plant.fleet.fleet_settings import FleetSettings
 from livebode_plant.fleet.log import FleetLog
 from livebode_plant.fleet.message import read_message
 from livebode_plant.fleet.reader import stored_messages
+from livebode_plant.fleet.replay import CheckResult, check_results
 from livebode_plant.fleet.result_message import ResultMessage
 from livebode_plant.fleet.server import LogServer
 from livebode_plant.fleet.status import fleet_status, status_of

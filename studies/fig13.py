@@ -9,7 +9,7 @@ import numpy as np
 
 from livebode import Lines, Parameters, Responses, Settings, Tracker, fit_rational, multisine
 from livebode.fitting import Fitter, TwoMass
-from livebode.fitting.hold import to_discrete
+from livebode.fitting.transfer import to_discrete
 from livebode.motion import MotionCorrection
 from livebode.simulation import BeltAxis, Drive, Sensor, SimulatedAxis, Strokes
 from studies.common import SIGMA, Floats

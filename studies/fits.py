@@ -9,7 +9,7 @@ from scipy.special import ndtri
 
 from livebode import Block, Parameters, Responses, Settings, Tracker
 from livebode.fitting import EvaluationGrid, Fitter, TwoMass
-from livebode.fitting.problem import Measured, Problem
+from livebode.fitting.problem import MeasuredRows, Problem
 from livebode.motion import MotionCorrection
 from livebode.simulation import BeltAxis, Friction, Mechanics, Sensor, SimulatedAxis, Standstill, Strokes
 from studies.common import EXCITATION, RATE_HZ, SIGMA, WINDOW, Floats, lines, rms
@@ -54,7 +54,7 @@ def least_variance(periods: int = PERIODS[0]) -> Floats:
     grid = EvaluationGrid.of(lines())
     u = np.abs(BeltAxis(mechanics=FROZEN).closed_loop(PLACE_M).responses(grid.frequency_hz)[1]) * WINDOW / 2
     sigma = np.sqrt(WINDOW / periods) * SIGMA / u
-    exact = Measured(MODEL.at(TRUTH, grid)[np.newaxis], sigma[np.newaxis], np.ones((1, sigma.size), dtype=bool))
+    exact = MeasuredRows(MODEL.at(TRUTH, grid)[np.newaxis], sigma[np.newaxis], np.ones((1, sigma.size), dtype=bool))
     solution, _ = Problem(MODEL, grid).solve(exact, np.sqrt(2) / exact.sigma, TRUTH[np.newaxis])
     left = np.sqrt(2) / sigma[:, np.newaxis] * solution.slope[0]
     return np.diag(np.linalg.inv((left.conj().T @ left).real))

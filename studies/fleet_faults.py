@@ -31,7 +31,7 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
-from livebode_plant.fleet.check import AxisCheck
+from livebode_plant.fleet.replay import AxisCheck
 from livebode_plant.fleet.status import silences
 from studies.faulty_fleet import LATE_MAX, PARTITIONS, FaultyFleet
 

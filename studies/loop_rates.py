@@ -1,4 +1,4 @@
-"""How often `livebode check-loop` names the rate of a position loop, of drives whose velocity loop is slower too.
+"""How often `livebode validate --loop` names the rate of a position loop, of drives whose velocity loop is slower too.
 
 Run `python -m studies.loop_rates --runs 40`. The velocity loop runs at the rate of the recording, at half and at a
 quarter of it; the position loop at the rate of the velocity loop divided by 1, 2, 4, 8 and 16. Of each drive the

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import Block, Lines, MatrixResponses
-from livebode.mimo import MatrixExcitation
+from livebode.excitation import MatrixExcitation
 from livebode.simulation import CoreXY, CoreXYLoop, Gantry, GantryLoop, MotorLoop
 from livebode_matrix import (
     MatrixModes,
@@ -145,7 +145,7 @@ def modes(measured: list[MatrixResponses], machine: Gantry | CoreXY) -> tuple[fl
 def _is_right(found: MatrixModes, machine: Gantry | CoreXY) -> bool:
     """Whether number and kind of its poles are those of the machine, without further terms."""
     poles = true_poles(machine)
-    of, names = found.found, found.parameters.names
+    of, names = found.best, found.parameters.names
     plain = of is not None and not (of.structure.integrators or of.structure.direct or of.structure.delays)
     complex_ones = sum(name.startswith("frequency_") for name in names)
     return plain and found.order == len(poles) and complex_ones == np.count_nonzero(poles.imag > 0)

@@ -17,7 +17,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from livebode.core import Event, MatrixResponses
-from livebode.mimo import mean_matrix
+from livebode.fitting import mean_matrix
 from livebode.simulation import Gantry, GantryLoop
 from livebode_matrix import MatrixMonitor, MatrixTracker
 from livebode_matrix.line_correlation import RowSteps

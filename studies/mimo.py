@@ -15,8 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import PID, Block, Lines, MatrixResponses
-from livebode.mimo import MatrixExcitation, MatrixLoop
+from livebode.core import PID, Block, Lines, MatrixLoop, MatrixResponses
+from livebode.excitation import MatrixExcitation
 from livebode.simulation import Gantry, GantryLoop
 from livebode.simulation.gantry import CHANNELS
 from livebode_matrix import MatrixSettings, MatrixTracker

@@ -10,7 +10,7 @@ import numpy as np
 
 from livebode.monitoring import DEFAULT_INTERVAL_S, Evidence, LearnedMachine, MachineMonitor
 from livebode.monitoring.model_evidence import ModelEvidence
-from livebode.monitoring.offset import Offset
+from livebode.monitoring.sensitivity import Offset
 from livebode.monitoring.stretches import Stretches
 from livebode.simulation import LoadChange, SoftSpot, TensionLoss
 from studies.monitoring_axis import LINES, axis, run, strokes

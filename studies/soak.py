@@ -34,7 +34,7 @@ from websockets.sync.client import connect
 
 from livebode.configuration import Axis
 from livebode.core import Channel, Lines
-from livebode.dashboard import Dashboard, Serving
+from livebode.dashboard import Dashboard, ServerSettings
 from livebode.excitation import multisine
 from livebode.runtime import Destination, Document, Session, TrackerResults, segmented
 from livebode.simulation import TwoMassLoop
@@ -159,7 +159,7 @@ def measured(hours: float, *, as_live: bool = False) -> Curve:
     end, done = context.Event(), [context.Value("q", 0) for _ in range(AXES)]
     listeners = [socket.create_server(("127.0.0.1", 0)) for _ in range(AXES)]
     ports = [listener.getsockname()[1] for listener in listeners]
-    dashboard = Dashboard(Serving("127.0.0.1", 0))
+    dashboard = Dashboard(ServerSettings("127.0.0.1", 0))
     names = [f"x{i}" for i in range(AXES)]
     subscribers = {name: (dashboard.hub(name), Progress(one)) for name, one in zip(names, done)}
     with tempfile.TemporaryDirectory() as folder, dashboard:

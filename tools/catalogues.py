@@ -26,11 +26,11 @@ from livebode.analysis import MARGIN_NAMES as MARGINS
 from livebode.dashboard.quantities import QUANTITIES
 from livebode.estimation.verdicts import KINDS as DOUBTS
 from livebode.fitting import model_named
-from livebode.fitting.extended_model import LAG, MODE, RESIDUAL, ExtendedModel
+from livebode.fitting.competitors import LAG, MODE, RESIDUAL, ExtendedModel
 from livebode.fitting.models import MODELS
 from livebode.monitoring import ALARMS, RETURNS, UNMONITORED
 from livebode.monitoring.sensitivity import DIRECTIONS
-from livebode.runtime.event_groups import CAUSES
+from livebode.runtime.run_counts import CAUSES
 
 ROOT = Path(__file__).parents[1]
 FOLDER = ROOT / "src/livebode/language/catalogues"

@@ -7,7 +7,6 @@ is no module (a script, C, a table) stands for the modules of the nearest direct
 
 from __future__ import annotations
 
-import ast
 import re
 import subprocess
 import sys
@@ -20,7 +19,12 @@ from livebode.plugins import named, plugins
 ROOT = Path(__file__).parents[1]
 _TOP = ("src", "tests", "tools", "studies", "bench", "wings")
 _TABLES_OF_COMMANDS = {plugin.reference.split(":")[0] for plugin in plugins("commands")}
-_NAMED = re.compile(r"(livebode\w*(?:\.\w+)+)(?::\w+)?")
+# Texts are searched: the trees of 1,800 modules take ten seconds.
+_FROM = re.compile(r"^\s*from (?P<module>[\w.]+) import (?:\((?P<many>[^)]*)\)|(?P<few>[^\n(]+))", re.MULTILINE)
+_IMPORT = re.compile(r"^\s*import ([\w., ]+)", re.MULTILINE)
+_COMMENT = re.compile(r"#.*")
+_STRING = re.compile(r"[\"']([\w-]+)[\"']")
+_NAMED = re.compile(r"[\"'](livebode\w*(?:\.\w+)+)(?::\w+)?[\"']")
 
 
 @cache
@@ -35,20 +39,34 @@ def modules() -> dict[str, Path]:
 
 
 @cache
-def _tree(name: str) -> ast.Module:
+def _text(name: str) -> str:
     path, stub = modules()[name], modules()[name].with_suffix(".pyi")  # a face has its names in a stub
-    return ast.parse((stub if stub.exists() else path).read_text(encoding="utf-8"))
+    return (stub if stub.exists() else path).read_text(encoding="utf-8")
 
 
 @cache
+def _imported(name: str) -> tuple[tuple[str, str], ...]:
+    """Module and attribute of each `from module import attribute`, also of those in the text of a script."""
+    return tuple(
+        (found["module"], alias.split()[0])
+        for found in _FROM.finditer(_text(name))
+        for alias in _COMMENT.sub("", found["few"] or found["many"]).split(",")
+        if alias.strip()
+    )
+
+
+@cache
+def _homes(name: str) -> dict[str, str]:
+    """Module that each imported attribute of a module is from."""
+    return {attribute: module for module, attribute in reversed(_imported(name))}
+
+
 def _home(name: str, attribute: str) -> str:
     """The module that a name of a module, or of a package's face, comes from."""
     if f"{name}.{attribute}" in modules():
         return f"{name}.{attribute}"
-    for node in ast.walk(_tree(name)) if name in modules() else ():
-        if isinstance(node, ast.ImportFrom) and any(alias.name == attribute for alias in node.names):
-            return _home(node.module or "", attribute) if node.module != name else name
-    return name
+    origin = _homes(name).get(attribute, name) if name in modules() else name
+    return name if origin == name else _home(origin, attribute)
 
 
 @cache
@@ -58,43 +76,44 @@ def imports(name: str) -> frozenset[str]:
 
 
 def _imports(name: str) -> Iterator[str]:
-    face = modules()[name].name == "__init__.py"
-    for node in ast.walk(_tree(name)):
-        if isinstance(node, ast.ImportFrom) and not face:
-            yield from (_home(node.module or "", alias.name) for alias in node.names)
-        elif isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
-        elif isinstance(node, ast.Constant) and isinstance(node.value, str):
-            yield from _named(node.value, name)
+    if modules()[name].name != "__init__.py":
+        yield from (_home(module, attribute) for module, attribute in _imported(name))
+    for names in _IMPORT.findall(_text(name)):
+        yield from (alias.split()[0] for alias in names.split(","))
+    if name not in _TABLES_OF_COMMANDS:  # else whatever runs a command in this process would depend on all commands
+        yield from _NAMED.findall(_text(name))
+        if "tests" in name.split("."):
+            yield from _of_commands(name)
 
 
-def _named(text: str, by: str) -> Iterator[str]:
-    if by in _TABLES_OF_COMMANDS:
-        return  # else whatever runs a command in this process would depend on all commands
-    if found := _NAMED.fullmatch(text):
-        yield found[1]
-    if "tests" in by.split(".") and (command := named("commands").get(text)):
+def _of_commands(name: str) -> Iterator[str]:
+    """Modules of the commands whose names are strings of a test."""
+    for text in set(_STRING.findall(_text(name))) & named("commands").keys():
+        command = named("commands")[text]
         yield from (
             one.function.split(":")[0] for one in ([command] if command.function else command.commands.values())
         )
 
 
-def concerned(changed: Iterable[str]) -> set[str]:
-    """Modules that have changed, or import one of those directly or not."""
+@cache
+def _importers() -> dict[str, set[str]]:
+    """Modules that name a module, or are a test of its package, by the module's name."""
     importers: dict[str, set[str]] = {}
     for name in modules():
-        for other in imports(name):
+        own = tested(name)
+        for other in imports(name) | {other for other in modules() if own and (other + ".").startswith(own)}:
             importers.setdefault(other, set()).add(name)
-        if (own := tested(name)) is not None:
-            for other in modules():
-                if (other + ".").startswith(own):
-                    importers.setdefault(other, set()).add(name)
+    return importers
+
+
+def concerned(changed: Iterable[str]) -> set[str]:
+    """Modules that have changed, or import one of those directly or not."""
     found: set[str] = set()
     left = list(changed)
     while left:
         if (name := left.pop()) not in found:
             found.add(name)
-            left += importers.get(name, ())
+            left += _importers().get(name, ())
     return found
 
 

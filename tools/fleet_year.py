@@ -9,7 +9,7 @@ import numpy as np
 import pyarrow as pa
 
 from livebode.core import LEVELS
-from livebode_plant.lake import PARAMETER_MEANS, Lake, StreamTable
+from livebode_plant.lake import TABLES, Lake, StreamTable
 
 LOST_A_MONTH = 0.004
 """Share of the stiffness."""
@@ -52,4 +52,4 @@ def _rows(path: str, hours: list[datetime], name: str, unit: str, value: np.ndar
         | {"low": one * (1 - 2 * bound), "high": one * (1 + 2 * bound)}
         for at, one in zip(hours, value.tolist())
     ]
-    return pa.Table.from_pylist(rows, PARAMETER_MEANS)
+    return pa.Table.from_pylist(rows, TABLES["fleet_parameters_hour"].schema)

@@ -13,9 +13,10 @@ import numpy as np
 from livebode.core import Event
 from livebode.records import RUN, read_summary
 from livebode.records.segments.json_lines import to_line
+from livebode.records.segments.manifest import NAME as MANIFEST
 from livebode.records.summary_file import COPY, to_document
 from livebode.tables import ParquetFile, ParquetWriter, Table
-from tools.parquet_parts import parts_of
+from tools.parquet_parts import manifest_of
 
 
 def copy_run(
@@ -27,7 +28,7 @@ def copy_run(
     alarm: str = "",
     changes: Mapping[str, Any] | None = None,
 ) -> Path:
-    """Write a copy of a run in one piece; tables that do not change are the same files.
+    """Write a copy of the run of a recording; tables that do not change are the same files.
 
     Parameters
     ----------
@@ -49,7 +50,7 @@ def copy_run(
         _scaled(run / "parameters.parquet", to / "parameters.parquet", factors)
     else:
         os.link(run / "parameters.parquet", to / "parameters.parquet")
-    summary |= {"files": {path.name: parts_of(path) for path in sorted(to.glob("*.parquet"))}}
+    (to / MANIFEST).write_bytes(listed := manifest_of(to))
     if begun is not None:
         summary["clock"] = [[0.0, begun]]
     events = []
@@ -57,7 +58,7 @@ def copy_run(
         events.append(asdict(Event("change", 1000, 1.0, alarm)))
     lines = b"".join(map(to_line, events))
     (to / "events.jsonl").write_bytes(lines)
-    summary["size_bytes"] = {"events.jsonl": len(lines)}
+    summary["size_bytes"] = {"events.jsonl": len(lines), MANIFEST: len(listed)}
     for name in (RUN, COPY):
         (to / name).write_bytes(to_document(summary | dict(changes or {})))
     return to

@@ -33,9 +33,9 @@ import asyncio, sys, uvicorn
 from flooded import app
 from livebode.dashboard.dashboard import listening
 from livebode.dashboard.server import Server
-from livebode.dashboard.server_settings import Serving
+from livebode.dashboard.server_settings import ServerSettings
 config = uvicorn.Config(app, lifespan="off", log_config=None)
-asyncio.run(Server(config, listening(Serving("127.0.0.1", int(sys.argv[1]))), print).serve())
+asyncio.run(Server(config, listening(ServerSettings("127.0.0.1", int(sys.argv[1]))), print).serve())
 """
 
 

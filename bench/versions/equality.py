@@ -47,9 +47,9 @@ fit runs/gantry
 margins runs/loop
 margins runs/loop --json
 validate runs/standstill --on example/standstill-2.csv
-check-loop runs/tune
+check-loop runs/tune => validate runs/tune --loop
 tune runs/tune --loop-checked
-shaper runs/tune
+shaper runs/tune => tune runs/tune --shaper
 friction example/strokes.toml --json
 orders example/strokes.toml
 learn runs/monday runs/tuesday --out axis.baseline

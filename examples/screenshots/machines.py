@@ -17,8 +17,7 @@ from livebode.configuration.axis import FitSection
 from livebode.core import Block, Channel, Lines
 from livebode.dashboard import Hub
 from livebode.estimation import Settings, Tracker, plant_kinds
-from livebode.excitation import multisine
-from livebode.mimo import MatrixExcitation
+from livebode.excitation import MatrixExcitation, multisine
 from livebode.monitoring import Baseline, Monitor
 from livebode.runtime import ChangeDetection, Destination, Feed, Fits, RunLoop, SingleResponse
 from livebode.runtime._demo import RATE_HZ, demo_axis, described_loop

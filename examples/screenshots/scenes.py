@@ -13,7 +13,7 @@ from playwright.sync_api import Page
 
 from examples.screenshots.studio import AXIS, DESK, HALL, LANDSCAPE, MOMENT_S, PHONE, Studio, picture
 from livebode.core import Event, Lines
-from livebode.dashboard import Dashboard, Serving
+from livebode.dashboard import Dashboard, ServerSettings
 from livebode.runtime._demo import RATE_HZ
 from tools.run_copies import copy_run
 
@@ -121,7 +121,7 @@ def silent(studio: Studio) -> bytes:
 
 @scene
 def not_begun(studio: Studio) -> bytes:
-    dashboard = Dashboard(Serving("127.0.0.1", 0))
+    dashboard = Dashboard(ServerSettings("127.0.0.1", 0))
     dashboard.hub("axis-x")
     with dashboard:
         return picture(studio.page(dashboard.url, until="() => window.livebode?.page.facts"))

@@ -17,7 +17,7 @@ from playwright.sync_api import Browser, Page, sync_playwright
 
 from examples.screenshots.machines import Afterwards, Tracked, at_standstill, healthy, write_gantry, write_loop
 from livebode.core import Lines
-from livebode.dashboard import Dashboard, Serving
+from livebode.dashboard import Dashboard, ServerSettings
 from livebode.monitoring import Baseline
 from livebode.runtime import ClockSet, Destination, demo, demo_baseline
 from livebode.runtime._demo import RATE_HZ, demo_settings
@@ -72,7 +72,7 @@ class Studio(ExitStack):
         axis = write_loop(self.folder / "two masses")
         run = axis.parent / "axis"
         livebode = Path(sys.executable).with_name("livebode")
-        for command in (["run", axis, "--out", run], ["check-loop", run], ["tune", run]):
+        for command in (["run", axis, "--out", run], ["validate", run, "--loop"], ["tune", run]):
             subprocess.run([livebode, *command], check=True, stdout=subprocess.DEVNULL)
         return run
 
@@ -113,7 +113,7 @@ class Studio(ExitStack):
                 self.faulty, weeks / f"axis-x-day-{day + 1:02d}", begun=BEGUN + day * DAY_S, factors=factors,
                 alarm=alarm, changes={"monitoring": monitoring},
             )  # fmt: skip
-        dashboard = Dashboard(Serving("127.0.0.1", 0))
+        dashboard = Dashboard(ServerSettings("127.0.0.1", 0))
         dashboard.view_all(weeks)
         return self.enter_context(dashboard).url
 
@@ -123,14 +123,14 @@ class Studio(ExitStack):
 
     def views(self, runs: Sequence[Path]) -> str:
         """A dashboard of finished runs."""
-        dashboard = Dashboard(Serving("127.0.0.1", 0))
+        dashboard = Dashboard(ServerSettings("127.0.0.1", 0))
         for run in runs:
             dashboard.view(run)
         return self.enter_context(dashboard).url
 
     def live(self, axes: dict[str, Afterwards]) -> Dashboard:
         """A dashboard of machines that were healthy for 20 s; it still has to be entered."""
-        dashboard = Dashboard(Serving("127.0.0.1", 0))
+        dashboard = Dashboard(ServerSettings("127.0.0.1", 0))
         for name, afterwards in axes.items():
             hub, held = dashboard.hub(name), healthy(afterwards)
             directory = self.folder / f"{name}-{time.monotonic_ns()}"
@@ -141,17 +141,16 @@ class Studio(ExitStack):
     @cached_property
     def fleet_url(self) -> str:
         """A simulated fleet with a floor plan, and a year of AXIS; one of its partitions has no worker."""
-        from livebode_plant.page.fleet_demo import DemoFeed, DemoFleet
-        from livebode_plant.page.fleet_pages import FleetSite
-        from livebode_plant.page.fleet_view import FleetView
+        from livebode_plant.page.fleet_feed import DemoFeed, DemoFleet
+        from livebode_plant.page.fleet_pages import FleetView
         from livebode_plant.page.floor_plan import floor_plan
 
         fleet, lake = DemoFleet(10_000), self.folder / "lake"
         feed = DemoFeed(fleet, silent=[3], began_s=time.time() - 150)
         status = fleet.status(150.0, time.time())
         write_year(lake, AXIS, float(status["value"][fleet.paths.index(AXIS)]))
-        dashboard = Dashboard(Serving("127.0.0.1", 0))
-        dashboard.show(FleetSite(FleetView(feed, floor_plan(_PLAN), lake=str(lake))))
+        dashboard = Dashboard(ServerSettings("127.0.0.1", 0))
+        dashboard.show(FleetView(feed, floor_plan(_PLAN), lake=str(lake)))
         return self.enter_context(dashboard).url
 
     def page(

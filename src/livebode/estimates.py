@@ -24,7 +24,7 @@ ESTIMATES: Mapping[str, Mapping[str, str]] = {
         "recording": "livebode.runtime.recording:examined_recordings",
         "draw": "livebode.cli.pictures:draw_response",
         "show": "livebode.cli.pictures:show",
-        "page": "livebode.dashboard.matrix_view:views_of_response",
+        "page": "livebode.dashboard.run_feed:views_of_response",
         "export": "livebode.cli.export_command:responses",
     },
 }

@@ -31,6 +31,7 @@ GROUPS: Mapping[str, type[Mapping[str, Any]] | type[Sequence[Any]]] = {
     "documents": Mapping,
     "examples": Mapping,
     "files": Mapping,
+    "pages": Mapping,
 }
 """The groups, and the type of their tables; a mapping has the name of each part."""
 _OWN = "livebode"

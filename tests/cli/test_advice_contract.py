@@ -173,6 +173,7 @@ ADVICE = [
     ),
     ("fit noise --order 2", "add --model modal or --model rational", "fit noise --model rational --order 2"),
     ("fit noise beside", "with one run for each output", "fit noise beside --model rational --order 2"),
+    ("validate noise", "give --on LOG to test the fitted model", "validate noise --on beside --model rational"),
     ("learn one", "give --out BASELINE", "learn one --out new.json"),
     (
         "learn one --out healthy.json",
@@ -355,7 +356,7 @@ NOT_HERE = {
     "livebode and start it again": "a live run: tests/runtime",
     "livebode first": "a live run: tests/runtime",
     "livebode after it": "needs LinuxCNC",
-    "livebode check-loop": "in tests/cli/test_check_loop_truth.py and test_tune_truth.py",
+    "livebode validate --loop": "in wings/control/tests/test_check_loop_truth.py and test_tune_truth.py",
     "as in livebode fit": "in tests/cli/test_shaper_truth.py",
     "use livebode tune again": "a damaged tune.json, and tune takes 3 s",
     "leave out --output, --input": "a matrix run with described controllers",

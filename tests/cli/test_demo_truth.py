@@ -12,8 +12,8 @@ import pytest
 from livebode.analysis import Overview
 from livebode.core import UsageError
 from livebode.dashboard import Hub
+from livebode.dashboard.board import verdict
 from livebode.dashboard.state import State
-from livebode.dashboard.verdict import verdict
 from livebode.estimation import Tracker
 from livebode.monitoring import Monitor
 from livebode.records import RunRecord

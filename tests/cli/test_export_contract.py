@@ -14,7 +14,7 @@ import pyuff
 import scipy.io
 import xarray as xr
 
-from livebode.export import at, writers
+from livebode.export import nearest_response, writers
 from livebode.fitting import mean_response
 from livebode.records import RunRecord
 from tests.support.command import livebode, signals, write_parquet
@@ -64,7 +64,7 @@ def test_every_format_of_a_whole_run(run: Path) -> None:
 def test_one_response_or_the_mean_of_a_run_is_exported(run: Path, tmp_path: Path) -> None:
     batches = RunRecord.open(run).batches
     for options, expected in (
-        (("--at", "1.0"), at(batches(), 1.0)),
+        (("--at", "1.0"), nearest_response(batches(), 1.0)),
         (("--mean",), mean_response(batches())[0]),
     ):
         path = tmp_path / "below" / f"{len(options)}{options[0]}.csv"
@@ -76,7 +76,7 @@ def test_one_response_or_the_mean_of_a_run_is_exported(run: Path, tmp_path: Path
         # The plant is a gain of 2 behind a sample of delay.
         truth = 2 * np.exp(-2j * np.pi * frame["frequency [Hz]"] / 1000)
         assert (np.abs(expected.value - truth) <= expected.bound(3)).all()
-    assert abs(at(batches(), 1.0).time_s - 1.0) <= 0.005
+    assert abs(nearest_response(batches(), 1.0).time_s - 1.0) <= 0.005
 
 
 def test_parameters_of_a_run_are_exported_and_a_run_without_fits_is_refused(run: Path, tmp_path: Path) -> None:

@@ -87,6 +87,9 @@ def test_a_run_is_fitted_afterwards(machine: Path) -> None:
     for name, truth in (("Js", 0.0028), ("mL", 6.7), ("Keff", 5e5), ("bs", 130.0)):
         quantity = found["quantities"][name]
         assert abs(quantity["value"] - truth) < 2 * quantity["bound_95"], name
+    tied = livebode("fit", out, "--model", "two-mass", "--radius", 0.019, "--ratio", 6.7 * 0.019**2 / 0.0028, "--json")
+    both = json.loads(tied.out)["quantities"]
+    assert both["mL"]["value"] / both["Js"]["value"] == pytest.approx(6.7 / 0.0028, rel=1e-9)
     delayed = ("--model", "two-mass", "--radius", 0.019, "--free", "delay", "--json")
     sampled, continuous = (livebode("fit", out, *delayed, "--hold", hold) for hold in ("zero-order", "none"))
     delays_s = [json.loads(one.out)["quantities"]["delay"]["value"] for one in (sampled, continuous)]

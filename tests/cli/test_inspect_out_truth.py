@@ -89,8 +89,8 @@ def test_an_existing_file_and_a_missing_terminal_are_one_sentence_each(
 @pytest.mark.parametrize(
     ("words", "says"),
     [
-        (("--schedule", "x"), "--schedule is for the configuration of the recording; give --out axis.toml too"),
-        (("--no-average",), "--average is for the configuration"),
+        (("--schedule", "x"), "--schedule belongs to --out; give --out axis.toml too"),
+        (("--no-average",), "--average belongs to --out"),
         (("--out", "other.toml", "--from", "3"), "--from and --out exclude each other"),
     ],
 )

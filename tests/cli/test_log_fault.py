@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from livebode.cli.log_output import LineFormatter, log_output
 from livebode.configuration import Axis
 from livebode.core import SourceError
-from livebode.dashboard import Dashboard, Serving
+from livebode.dashboard import Dashboard, ServerSettings
 from livebode.plugins import named
 from livebode.sources.live import SourceSettings, make_source
 from tests.support.command import livebode, signals, write_parquet
@@ -230,7 +230,7 @@ def test_a_record_is_logged_from_its_beginning_over_its_segments_to_its_end(
 
 
 def test_a_dashboard_is_logged_from_its_start_to_its_stop(caplog: pytest.LogCaptureFixture) -> None:
-    with caplog.at_level(logging.INFO, "livebode"), Dashboard(Serving("127.0.0.1", 0)) as dashboard:
+    with caplog.at_level(logging.INFO, "livebode"), Dashboard(ServerSettings("127.0.0.1", 0)) as dashboard:
         url = dashboard.url
     assert [message for name, _, message in caplog.record_tuples if name == "livebode.dashboard.dashboard"] == [
         f"listening at {url}",

@@ -29,7 +29,7 @@ def test_the_run_directory_holds_what_the_tracker_gives(log: Path, tmp_path: Pat
     result = livebode("run", log, *JOINT, "--schedule", "t", *lines, "--hop", 7, "--out", out, pictures=True)
     assert (result.code, result.err) == (0, "")
     assert sorted(p.name for p in out.iterdir()) == [
-        "bode.png", "events.jsonl", "responses.parquet", "run-copy.json", "run.json", "tracking.png",
+        "bode.png", "events.jsonl", "manifest.jsonl", "responses.parquet", "run-copy.json", "run.json", "tracking.png",
     ]  # fmt: skip
     columns = signals()
     block = Block(np.array([columns[n] for n in "wuyt"]), tuple("wuyt"), RATE_HZ)
@@ -55,7 +55,7 @@ def test_the_summary_counts_and_names_what_was_done(log: Path, tmp_path: Path) -
     summary = json.loads(result.out)
     stored = json.loads((tmp_path / "run" / "run.json").read_text())
     assert {k: v for k, v in summary.items() if k != "directory"} == {
-        k: v for k, v in stored.items() if k not in ("format", "version", "files", "size_bytes", "crc32")
+        k: v for k, v in stored.items() if k not in ("format", "version", "size_bytes", "crc32")
     }
     assert stored["counts"]["samples"] == 2000
     assert stored["counts"]["responses"] == 2000 // stored["found"]["hop"]

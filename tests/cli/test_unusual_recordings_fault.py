@@ -129,11 +129,12 @@ RUNS = (
 USES = (
     "fit RUN", "fit RUN --model rigid", "fit RUN --model two-mass", "fit RUN --model three-mass",
     "fit RUN --model two-mass-gain", "fit RUN --model modal", "fit RUN --model rational", "margins RUN",
-    "margins RUN --axis loop.toml", "check-loop RUN", "check-loop RUN --axis loop.toml", "tune RUN --axis loop.toml",
-    "shaper RUN", "validate RUN --on LOG", "validate RUN --on LOG --model rigid", "validate RUN --on LOG --at-lines",
-    "validate RUN --on RUN", "learn RUN --out b.json", "report RUN", "compare RUN RUN", "export RUN --to csv",
-    "export RUN --to mat --mean", "export RUN --to uff --at 0.1", "export RUN --to csv --parameters",
-    "export RUN --to json --lpv", "friction RUN", "orders RUN", "run LOG RUN --output y --input u --out RUN2",
+    "margins RUN --axis loop.toml", "validate RUN --loop", "validate RUN --loop --axis loop.toml",
+    "tune RUN --axis loop.toml", "tune RUN --shaper", "validate RUN --on LOG", "validate RUN --on LOG --model rigid",
+    "validate RUN --on LOG --at-lines", "validate RUN --on RUN", "learn RUN --out b.json", "report RUN",
+    "compare RUN RUN", "export RUN --to csv", "export RUN --to mat --mean", "export RUN --to uff --at 0.1",
+    "export RUN --to csv --parameters", "export RUN --to json --lpv", "friction RUN", "orders RUN",
+    "run LOG RUN --output y --input u --out RUN2",
 )  # fmt: skip
 LOOP = '[source]\nlog = "log.csv"\n[signals]\ninput = "u"\noutput = "y"\n[loop]\ngain = 0.3\nintegral_time_s = 0.02\n'
 

@@ -2,44 +2,18 @@
 
 from __future__ import annotations
 
-import json
-import subprocess
-import sys
-from typing import Any, NamedTuple
-
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
 from livebode.tables import Table, write_parquet
+from tests.support.answers import Answer
+from tests.support.answers import answers as in_one_process
 from tests.support.loop_runs import AXIS, record
 
 CHIRP = "--excitation w --input u --output velocity --lines 20:140:10 --window 400"
 ABSENT = ("scipy", "matplotlib", "mpl_toolkits", "PIL", "contourpy", "kiwisolver", "fontTools", "pyarrow", "nanoarrow")
-PROGRAM = """
-import contextlib, io, json, sys
-for name in {absent!r}:
-    sys.modules[name] = None
-from livebode.cli import main
-answers = []
-for words in {commands!r}:
-    sys.argv[1:] = words
-    out, err, code = io.StringIO(), io.StringIO(), 0
-    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
-        try:
-            main()
-        except SystemExit as end:
-            code = end.code or 0
-    answers.append((code, out.getvalue(), err.getvalue()))
-print(json.dumps(answers))
-"""
-
-
-class Answer(NamedTuple):
-    code: int
-    out: str
-    err: str
 
 
 @pytest.fixture(scope="module")
@@ -81,11 +55,7 @@ def answers(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Answer]:
         "fleet": ["fleet", "run", "--demo"],
         "output-only": ["run", str(folder / "log.parquet"), "--output-only", "--output", "y", "--out", run + "2"],
     }
-    code = PROGRAM.format(absent=ABSENT, commands=list(commands.values()))
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=folder)
-    assert done.returncode == 0, done.stderr
-    found: list[Any] = json.loads(done.stdout.splitlines()[-1])
-    return {name: Answer(*answer) for name, answer in zip(commands, found)}
+    return dict(zip(commands, in_one_process(*commands.values(), absent=ABSENT, folder=folder)))
 
 
 @pytest.mark.parametrize(

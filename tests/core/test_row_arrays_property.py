@@ -55,7 +55,7 @@ def bits(batch: RowArrays) -> dict[str, Any]:
 
 def test_the_batches_are_found() -> None:
     names = {kind.__name__ for kind in KINDS}
-    assert names >= {"Responses", "Parameters", "Margins", "WindowRows", "Evidence", "TrendRows", "Measured"}
+    assert names >= {"Responses", "Parameters", "Margins", "WindowRows", "Evidence", "TrendRows", "MeasuredRows"}
 
 
 @every_kind

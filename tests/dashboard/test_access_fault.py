@@ -18,7 +18,7 @@ from websockets.sync.client import connect
 
 from livebode.configuration import Axis, ServeSection
 from livebode.core import ConfigError, Event, LivebodeError, ServerError
-from livebode.dashboard import Dashboard, Serving
+from livebode.dashboard import Dashboard, ServerSettings
 from livebode.dashboard.access import Access
 from livebode.dashboard.guard import Guard
 from tests.support.browser import Tab, chromium
@@ -159,7 +159,7 @@ def test_code_of_the_page_never_makes_html_of_data() -> None:
 
 def test_wrong_tokens_are_refused_with_increasing_delay_and_reported_once() -> None:
     now, messages = [0.0], list[str]()
-    access = Access(Serving("127.0.0.1", 0, token=TOKEN), messages.append, clock=lambda: now[0])
+    access = Access(ServerSettings("127.0.0.1", 0, token=TOKEN), messages.append, clock=lambda: now[0])
     for _ in range(5):
         assert access.login("wrong" * 10, "10.0.0.5") is None
     waits = []
@@ -185,7 +185,7 @@ def test_wrong_tokens_are_refused_with_increasing_delay_and_reported_once() -> N
 
 def test_login_sessions_expire_and_their_number_is_limited() -> None:
     now = [0.0]
-    access = Access(Serving("127.0.0.1", 0, token=TOKEN), lambda _: None, clock=lambda: now[0])
+    access = Access(ServerSettings("127.0.0.1", 0, token=TOKEN), lambda _: None, clock=lambda: now[0])
     first = access.login(TOKEN, "::1")
     assert access.role(f"livebode={first}", "", "::1") == "operator"
     now[0] = 13 * 3600.0
@@ -200,7 +200,9 @@ def test_login_sessions_expire_and_their_number_is_limited() -> None:
 
 def test_log_ins_end_only_sessions_of_their_role_and_first_their_own() -> None:
     now = [0.0]
-    access = Access(Serving("127.0.0.1", 0, token=TOKEN, viewer_token=VIEWER), lambda _: None, clock=lambda: now[0])
+    access = Access(
+        ServerSettings("127.0.0.1", 0, token=TOKEN, viewer_token=VIEWER), lambda _: None, clock=lambda: now[0]
+    )
     people = {
         address: access.login(token, address)
         for token in (TOKEN, VIEWER)
@@ -229,7 +231,7 @@ def test_tokens_are_compared_in_constant_time(monkeypatch: pytest.MonkeyPatch) -
     seen: list[tuple[bytes, bytes]] = []
     real = hmac.compare_digest
     monkeypatch.setattr(hmac, "compare_digest", lambda a, b: (seen.append((a, b)), real(a, b))[1])
-    access = Access(Serving("127.0.0.1", 0, token=TOKEN, viewer_token=VIEWER), lambda _: None)
+    access = Access(ServerSettings("127.0.0.1", 0, token=TOKEN, viewer_token=VIEWER), lambda _: None)
     for token in (TOKEN, VIEWER, "", "x", TOKEN + "x"):
         seen.clear()
         access.login(token, "::1")
@@ -261,7 +263,7 @@ def test_impossible_settings_of_the_server_are_refused(
     for name, value in SERVE.items():
         monkeypatch.setenv(name, value)
     with pytest.raises(ConfigError) as caught:
-        Serving.of(ServeSection.model_validate(section))
+        ServerSettings.of(ServeSection.model_validate(section))
     assert (caught.value.code, caught.value.key) == (f"config.{code}", key)
     shown = json.dumps(caught.value.as_dict())
     assert not any(secret in shown for secret in SERVE.values() if len(secret) > 5)
@@ -279,7 +281,7 @@ def test_a_missing_token_is_refused(monkeypatch: pytest.MonkeyPatch, section: di
     for name, value in SERVE.items():
         monkeypatch.setenv(name, value)
     with pytest.raises(LivebodeError, match=re.escape(word)) as caught:
-        Serving.of(ServeSection.model_validate(section))
+        ServerSettings.of(ServeSection.model_validate(section))
     shown = json.dumps(caught.value.as_dict())
     assert not any(secret in shown for secret in SERVE.values() if len(secret) > 5)
 
@@ -292,13 +294,13 @@ def test_a_token_that_others_can_read_is_refused_with_the_remedy(tmp_path: Path,
     for mode in (0o644, 0o604, 0o620, 0o602):
         path.chmod(mode)
         with pytest.raises(ConfigError) as caught:
-            Serving.of(section)
+            ServerSettings.of(section)
         assert (caught.value.code, caught.value.mode) == ("config.file-open-to-others", mode)
         assert caught.value.remedy.startswith(f"run `chmod 600 '{path}'`")
         assert TOKEN not in json.dumps(caught.value.as_dict())
     for mode in (0o600, 0o640, 0o400):
         path.chmod(mode)
-        assert TOKEN in (Serving.of(section).token, Serving.of(section).viewer_token)
+        assert TOKEN in (ServerSettings.of(section).token, ServerSettings.of(section).viewer_token)
 
 
 def test_the_documented_command_writes_a_token_that_only_its_owner_can_read(tmp_path: Path) -> None:
@@ -307,13 +309,13 @@ def test_the_documented_command_writes_a_token_that_only_its_owner_can_read(tmp_
     path = tmp_path / "token"
     command = command.replace("/etc/livebode/token", str(path)).replace("python ", f"{sys.executable} ")
     subprocess.run(["sh", "-c", f"umask 022; {command}"], check=True)
-    assert Serving.of(ServeSection(token_file=path)).token == path.read_text().strip()
+    assert ServerSettings.of(ServeSection(token_file=path)).token == path.read_text().strip()
 
 
 def test_a_port_in_use_is_reported() -> None:
-    with Dashboard(Serving("127.0.0.1", 0)) as first:
+    with Dashboard(ServerSettings("127.0.0.1", 0)) as first:
         port = int(first.url.rsplit(":", 1)[1].strip("/"))
-        with refused(ServerError, "port-taken", port=port), Dashboard(Serving("127.0.0.1", port)):
+        with refused(ServerError, "port-taken", port=port), Dashboard(ServerSettings("127.0.0.1", port)):
             pass
 
 
@@ -324,7 +326,7 @@ def test_tls_and_a_token_for_another_address(tmp_path: Path, monkeypatch: pytest
     section = ServeSection(
         address="0.0.0.0", port=0, token_env="LIVEBODE_TOKEN", certificate_file=certificate, key_file=key
     )
-    with Watched(tmp_path / "run", Serving.of(section)) as watched:
+    with Watched(tmp_path / "run", ServerSettings.of(section)) as watched:
         watched.go(6000)
         port = port_of(watched)
         trust = ssl.create_default_context(cafile=str(authority.file))
@@ -360,7 +362,7 @@ def test_secrets_are_nowhere_but_where_they_belong(watched: Watched) -> None:
         if file.is_file():
             assert TOKEN.encode() not in file.read_bytes()
             assert VIEWER.encode() not in file.read_bytes()
-    assert TOKEN not in repr(Serving("127.0.0.1", 0, token=TOKEN))
+    assert TOKEN not in repr(ServerSettings("127.0.0.1", 0, token=TOKEN))
 
 
 def test_the_section_of_a_file_is_not_recorded(tmp_path: Path) -> None:
@@ -375,7 +377,7 @@ def test_the_section_of_a_file_is_not_recorded(tmp_path: Path) -> None:
 
 
 def test_read_only_applies_to_operators_too() -> None:
-    access = Access(Serving("127.0.0.1", 0, read_only=True), lambda _: None)
+    access = Access(ServerSettings("127.0.0.1", 0, read_only=True), lambda _: None)
     assert access.role("", "", "::1") == "viewer"
-    access = Access(Serving("127.0.0.1", 0, token=TOKEN, read_only=True), lambda _: None)
+    access = Access(ServerSettings("127.0.0.1", 0, token=TOKEN, read_only=True), lambda _: None)
     assert access.role("", f"Bearer {TOKEN}", "::1") == "viewer"

@@ -11,7 +11,7 @@ import pytest
 from playwright.sync_api import Browser
 
 from livebode.core import Event
-from livebode.dashboard import Dashboard, Serving
+from livebode.dashboard import Dashboard, ServerSettings
 from livebode_reports.html import to_html
 from livebode_reports.report_data import read
 from livebode_reports.run_report import report_of
@@ -362,7 +362,7 @@ def test_axe_finds_nothing_on_the_other_pages(browser: Browser, watched: Watched
     compared(watched.directory, runs / "compared")
     document = report_of(read(runs / "day 4"), made=datetime.now(UTC))
     (tmp_path / "report.html").write_text(to_html(document), "utf-8")
-    dashboard = Dashboard(Serving("127.0.0.1", 0))
+    dashboard = Dashboard(ServerSettings("127.0.0.1", 0))
     dashboard.view_all(runs)
     found = []
     with dashboard, with_axe(browser) as tab:

@@ -14,11 +14,11 @@ import pytest
 
 from livebode.analysis import Overview
 from livebode.core import Event
-from livebode.dashboard import AlarmShelf, Dashboard, Hub, Serving
+from livebode.dashboard import AlarmShelf, Dashboard, Hub, ServerSettings
 from livebode.dashboard.alarm_requests import shelving, unshelving
+from livebode.dashboard.board import AxisVerdict, verdict
 from livebode.dashboard.notices import event_id
 from livebode.dashboard.state import State
-from livebode.dashboard.verdict import AxisVerdict, verdict
 from livebode.runtime import RunControl, RunEnded, RunStarted
 from tests.support.browser import until
 from tests.support.dashboards import LINES, Watched, begin
@@ -70,7 +70,7 @@ def test_a_shelf_is_recorded_and_survives_a_restart(watched: Watched) -> None:
     }
     assert 0 < shelved.details["until_s"] - time.time() <= 30 * 60
     watched.end()
-    viewing = Dashboard(Serving("127.0.0.1", 0))
+    viewing = Dashboard(ServerSettings("127.0.0.1", 0))
     viewing.view(watched.directory)
     assert state_of(viewing._states[0]) == "shelved"
     hub, control = Hub("axis"), RunControl()

@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 
 from livebode.core import Event, LivebodeError
 from livebode.dashboard import NAME_MAX, TEXT_MAX, AlarmShelf, alarm_request
-from livebode.dashboard.alarm import CHATTER_S, CHATTER_TIMES
-from livebode.dashboard.alarm_history import ROWS_MAX
+from livebode.dashboard.alarm import CHATTER_S, CHATTER_TIMES, ROWS_MAX
 from livebode.dashboard.alarm_requests import acknowledgement, shelving, unshelving
 from livebode.dashboard.notices import CAUSES_MAX, EventCauses, event_id
 from livebode.monitoring import ALARMS, RETURNS, SOURCE

@@ -14,7 +14,7 @@ import pytest
 from playwright.sync_api import Browser
 
 from livebode.configuration import LoopSection
-from livebode.dashboard import Dashboard, Serving, grid_hz
+from livebode.dashboard import Dashboard, ServerSettings, grid_hz
 from livebode.fitting import EvaluationGrid, model_named
 from livebode.records import RunRecord, read_saved
 from tests.support.browser import Tab
@@ -35,7 +35,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def served(run: Path) -> Iterator[Dashboard]:
-    dashboard = Dashboard(Serving("127.0.0.1", 0))
+    dashboard = Dashboard(ServerSettings("127.0.0.1", 0))
     dashboard.view(run)
     with dashboard:
         yield dashboard

@@ -3,14 +3,8 @@
 from __future__ import annotations
 
 import json
-import os
-import re
-import signal
-import subprocess
 import sys
 import urllib.request
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -23,41 +17,12 @@ from tests.support.command import livebode, signals, write_parquet
 from tests.support.dashboards import Watched
 from tests.support.demonstrated import already_learned, shown
 from tests.support.peers.peer import PATIENCE_S
-
-
-@contextmanager
-def started(folder: Path, *arguments: object, before: str = "") -> Iterator[tuple[subprocess.Popen[str], str]]:
-    """The command in a process of its own, and the address that it printed; ended by Ctrl-C, and cleanly."""
-    # What starts the tests in the background may have told them to ignore Ctrl-C.
-    code = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
-    code += f"{before}\nfrom livebode.cli import main; main()"
-    command = [sys.executable, "-c", code, *map(str, arguments)]
-    log = folder / "log.txt"
-    with log.open("w") as out:
-        process = subprocess.Popen(
-            command, stdout=out, stderr=out, text=True, env=os.environ | {"PYTHONUNBUFFERED": "1"}
-        )
-    found = None
-
-    def printed() -> bool:
-        nonlocal found
-        found = re.search(r"the dashboard is at (http\S+)", log.read_text())
-        assert process.poll() is None or found, log.read_text()
-        return found is not None
-
-    try:
-        until(printed, "the address", 60)
-        assert found
-        yield process, found.group(1)
-    finally:
-        process.send_signal(signal.SIGINT)
-        assert process.wait(PATIENCE_S) in (0, 130), log.read_text()
-        assert "Traceback" not in log.read_text(), log.read_text()
+from tests.support.served import served
 
 
 def test_the_demo_is_served_by_default_during_its_run_and_ends_by_itself(tmp_path: Path) -> None:
     out = tmp_path / "demo"
-    with started(tmp_path, "demo", "--seconds", 16, "--out", out, before=already_learned(tmp_path)) as (process, url):
+    with served(tmp_path, "demo", "--seconds", 16, "--out", out, before=already_learned(tmp_path)) as (process, url):
         assert url.startswith("http://127.0.0.1:")
         with chromium() as browser, Tab(browser, url) as tab:
             assert tab.js("page.facts.live")
@@ -75,7 +40,7 @@ def test_the_page_of_the_demo_stays_after_its_run_where_it_was_asked_for(
 ) -> None:
     out = tmp_path / "demo"
     asked = ("demo", "--serve", "--fast", "--port", 0, "--out", out)
-    with started(tmp_path, *asked, before=already_learned(tmp_path)) as (_, url):
+    with served(tmp_path, *asked, before=already_learned(tmp_path)) as (_, url):
         with chromium() as browser, Tab(browser, url) as tab:
             tab.until("!timeline.span.live")  # the run is done, and the page stays
             assert (out / "run.json").is_file()
@@ -109,7 +74,7 @@ def test_a_recording_is_shown_by_run(tmp_path: Path) -> None:
         100,
     ]
     out = tmp_path / "run"
-    with started(tmp_path, *arguments, "--serve", "--port", 0, "--out", out) as (_, url):
+    with served(tmp_path, *arguments, "--serve", "--port", 0, "--out", out) as (_, url):
         until(lambda: (out / "run.json").is_file(), "the end of the run")
         until(lambda: "until Ctrl-C" in (tmp_path / "log.txt").read_text(), "the end of what it prints")
         until(lambda: b"livebode" in urllib.request.urlopen(url).read(), "the page")
@@ -119,7 +84,7 @@ def test_a_recording_is_shown_by_run(tmp_path: Path) -> None:
 def test_view_follows_a_run_that_another_process_records(tmp_path: Path) -> None:
     with Watched(tmp_path / "run") as watched:
         watched.go(6000)
-        viewing = started(tmp_path, "view", tmp_path / "run", "--port", 0)
+        viewing = served(tmp_path, "view", tmp_path / "run", "--port", 0)
         with viewing as (_, url), chromium() as browser, Tab(browser, url) as tab:
             before = tab.js("timeline.span.last_s ?? 0")
             watched.go(11_000)
@@ -128,6 +93,17 @@ def test_view_follows_a_run_that_another_process_records(tmp_path: Path) -> None
             at_s = tab.js("bode.curves.measured.frame.timeS[0]")
             assert at_s in watched.record().responses().time_s
             assert tab.wrong == []
+
+
+def test_view_asks_for_the_token_of_the_file_that_it_is_given(tmp_path: Path) -> None:
+    run = shown()[0]
+    (tmp_path / "token").touch(0o600)
+    (tmp_path / "token").write_text("x" * 32)
+    (tmp_path / "serve.toml").write_text('[serve]\nport = 0\ntoken_file = "token"\n')
+    with served(tmp_path, "view", run, "--axis", tmp_path / "serve.toml") as (_, url):
+        assert urllib.request.urlopen(url).url.endswith("/login")
+        known = urllib.request.Request(url, headers={"Authorization": f"Bearer {'x' * 32}"})
+        assert not urllib.request.urlopen(known).url.endswith("/login")
 
 
 def test_view_of_a_directory_without_a_run_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,7 +14,7 @@ import numpy as np
 from playwright.sync_api import Browser
 
 from livebode.core import Block, Channel, Event, Lines, Parameters
-from livebode.dashboard import Dashboard, Hub, Serving
+from livebode.dashboard import Dashboard, Hub, ServerSettings
 from livebode.estimation import Tracker
 from livebode.runtime import ClockSet, FitResults, TrackerResults
 from livebode.simulation.two_mass_loop import RATE_HZ
@@ -29,7 +29,7 @@ ONE = Lines(LINES.bins[:1], LINES.window, RATE_HZ)
 @contextlib.contextmanager
 def axes(browser: Browser, *names: str, **options: object) -> Iterator[tuple[list[Hub], Tab]]:
     """A page of axes, of which the first has begun."""
-    dashboard = Dashboard(Serving("127.0.0.1", 0))
+    dashboard = Dashboard(ServerSettings("127.0.0.1", 0))
     hubs = [dashboard.hub(name) for name in names]
     begin(hubs[0], Path("/nowhere"), LINES)
     with dashboard, Tab(browser, dashboard.url, **options) as tab:
@@ -77,7 +77,7 @@ def test_an_axis_whose_machine_never_sent_shows_nothing_of_another(browser: Brow
 
 
 def test_a_page_that_is_opened_before_the_run_begins_shows_it_when_it_begins(browser: Browser) -> None:
-    dashboard = Dashboard(Serving("127.0.0.1", 0))
+    dashboard = Dashboard(ServerSettings("127.0.0.1", 0))
     hub = dashboard.hub("z")
     with dashboard, Tab(browser, dashboard.url, wait=False) as tab:
         tab.until("document.title === 'z · livebode' && !page.facts.begun && map.begun")

@@ -13,7 +13,7 @@ from playwright.sync_api import Browser
 
 from livebode.configuration import LoopSection
 from livebode.core import Response
-from livebode.dashboard import Dashboard, Serving, grid_hz
+from livebode.dashboard import Dashboard, ServerSettings, grid_hz
 from livebode.estimation import convert
 from livebode.fitting import EvaluationGrid, model_named
 from livebode.monitoring import BACK, FORTH
@@ -119,7 +119,7 @@ def test_the_newest_response_with_its_bands(browser: Browser, watched: Watched, 
 
 
 def test_drawn_pixels_are_at_the_positions_of_the_numbers(browser: Browser, whole: Path) -> None:
-    dashboard = Dashboard(Serving("127.0.0.1", 0))
+    dashboard = Dashboard(ServerSettings("127.0.0.1", 0))
     dashboard.view(whole)
     with dashboard, Tab(browser, dashboard.url) as tab:
         tab.page.locator('#quantities [data-value="sensitivity"]').focus()
@@ -139,7 +139,7 @@ def test_drawn_pixels_are_at_the_positions_of_the_numbers(browser: Browser, whol
 
 
 def test_model_and_margins_are_those_of_the_parameters(browser: Browser, whole: Path) -> None:
-    dashboard = Dashboard(Serving("127.0.0.1", 0))
+    dashboard = Dashboard(ServerSettings("127.0.0.1", 0))
     dashboard.view(whole)
     with dashboard, Tab(browser, dashboard.url) as tab:
         rows = [row for table in map(pa.table, RunRecord.open(whole).tables("parameters")) for row in table.to_pylist()]
@@ -180,7 +180,7 @@ def test_model_and_margins_are_those_of_the_parameters(browser: Browser, whole: 
 
 def test_tracking_and_map_are_those_of_the_record(browser: Browser, whole: Path) -> None:
     responses = RunRecord.open(whole).responses()
-    dashboard = Dashboard(Serving("127.0.0.1", 0))
+    dashboard = Dashboard(ServerSettings("127.0.0.1", 0))
     dashboard.view(whole)
     with dashboard, Tab(browser, dashboard.url) as tab:
         tab.page.locator("#tracking-span [data-value=whole]").click()
@@ -238,7 +238,7 @@ def test_tracking_and_map_are_those_of_the_record(browser: Browser, whole: Path)
 
 def test_the_baseline_is_drawn_where_the_machine_is(browser: Browser, whole: Path, tmp_path: Path) -> None:
     table = compared(whole, tmp_path / "run")
-    dashboard = Dashboard(Serving("127.0.0.1", 0))
+    dashboard = Dashboard(ServerSettings("127.0.0.1", 0))
     dashboard.view(tmp_path / "run")
     with dashboard, Tab(browser, dashboard.url) as tab:
         for time_s, way in ((None, BACK), (2.1, FORTH)):  # x = 0.9 + 0.6·sin(2π·t/2 s)
@@ -257,7 +257,7 @@ def test_the_baseline_is_drawn_where_the_machine_is(browser: Browser, whole: Pat
 
 
 def test_labels_of_neighbouring_ticks_do_not_overlap(browser: Browser, whole: Path) -> None:
-    dashboard = Dashboard(Serving("127.0.0.1", 0))
+    dashboard = Dashboard(ServerSettings("127.0.0.1", 0))
     dashboard.view(whole)
     with dashboard:
         for size in ({"width": 1440, "height": 900}, {"width": 768, "height": 1024}):

@@ -24,10 +24,9 @@ from websockets.asyncio.client import connect as connect_async
 from websockets.sync.client import ClientConnection, connect
 
 from livebode.cli.start import OBJECTS_NEW
-from livebode.dashboard import Dashboard, Serving, listener, listening, patience
+from livebode.dashboard import Dashboard, ServerSettings, listener, listening
 from livebode.dashboard.browser_socket import DISPLACED
-from livebode.dashboard.listener import Listener, connections_max
-from livebode.dashboard.patience import PatientProtocol
+from livebode.dashboard.listener import Listener, PatientProtocol, connections_max
 from livebode.dashboard.places import PLACES, ClientPlace, Places
 from livebode.dashboard.server import Faults
 from tests.support.browser import until
@@ -75,7 +74,7 @@ def test_too_many_browsers_and_messages_are_let_go(watched: Watched) -> None:
 
 def test_held_web_sockets_shut_the_owner_out_of_no_page() -> None:
     """Without a token nobody can show that the page is theirs: the oldest of the crowd goes."""
-    with Dashboard(Serving("127.0.0.1", 0)) as dashboard, contextlib.ExitStack() as stack:
+    with Dashboard(ServerSettings("127.0.0.1", 0)) as dashboard, contextlib.ExitStack() as stack:
         dashboard.hub("axis")
         url = dashboard.url.replace("http", "ws") + "live"
 
@@ -158,7 +157,7 @@ def test_a_web_socket_that_is_closed_under_tls_is_not_waited_for(
     """As by a reload of the page: its connection is over before a request would have been due."""
     authority, messages = Authority(tmp_path, "authority"), list[str]()
     tls, trust = authority.sign("dashboard"), ssl.create_default_context(cafile=str(authority.file))
-    with Dashboard(Serving("127.0.0.1", 0, tls=tls), messages.append) as dashboard:
+    with Dashboard(ServerSettings("127.0.0.1", 0, tls=tls), messages.append) as dashboard:
         dashboard.hub("axis")
         url = dashboard.url.replace("https", "wss") + "live"
         # The blocking client reads and writes one TLS session in two threads, and hangs once in about 1,000.
@@ -169,7 +168,7 @@ def test_a_web_socket_that_is_closed_under_tls_is_not_waited_for(
                 await live.recv()
             async with join() as live:
                 # Only now: a busy machine may need longer for a handshake.
-                monkeypatch.setattr(patience, "REQUEST_S", 0.2)
+                monkeypatch.setattr(listener, "REQUEST_S", 0.2)
                 await asyncio.sleep(1.5)  # the listener has looked at both
                 await live.send('{"kind": "pause"}')
                 return await live.recv()
@@ -186,7 +185,7 @@ def test_connections_that_end_in_their_handshake_do_not_wait_for_each_other_in_m
     gc.collect()
     gc.set_threshold(OBJECTS_NEW)
     try:
-        with Dashboard(Serving("127.0.0.1", 0, tls=tls)) as dashboard:
+        with Dashboard(ServerSettings("127.0.0.1", 0, tls=tls)) as dashboard:
             address = "127.0.0.1", int(dashboard.url.rstrip("/").rpartition(":")[2])
             for _ in range(300):
                 with socket.create_connection(address, PATIENCE_S) as plain:
@@ -204,7 +203,7 @@ def test_a_web_socket_that_its_browser_is_closing_ends_with_the_dashboard(tmp_pa
     """Under TLS the connection remains until the browser has answered; the thread of the dashboard must not fail."""
     authority = Authority(tmp_path, "authority")
     tls, trust = authority.sign("dashboard"), ssl.create_default_context(cafile=str(authority.file))
-    with Dashboard(Serving("127.0.0.1", 0, tls=tls)) as dashboard:
+    with Dashboard(ServerSettings("127.0.0.1", 0, tls=tls)) as dashboard:
         dashboard.hub("axis")
         host = dashboard.url.removeprefix("https://").rstrip("/")
         address = ("127.0.0.1", int(host.rpartition(":")[2]))
@@ -226,7 +225,7 @@ def test_a_web_socket_that_its_browser_is_closing_ends_with_the_dashboard(tmp_pa
 def test_a_body_that_does_not_come_is_not_waited_for(
     watched: Watched, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(patience, "REQUEST_S", 0.2)
+    monkeypatch.setattr(listener, "REQUEST_S", 0.2)
     host = f"127.0.0.1:{port_of(watched)}"
     head = f"POST /login HTTP/1.1\r\nHost: {host}\r\nOrigin: http://{host}\r\nContent-Length: 100\r\n\r\n{{"
     with socket.create_connection(("127.0.0.1", port_of(watched)), timeout=PATIENCE_S) as slow:
@@ -259,7 +258,7 @@ async def _answers(clients: int, *, closed: bool) -> tuple[int, bytes, int]:
     config = uvicorn.Config(application, lifespan="off", log_config=None)
     config.load()
     state = ServerState()
-    with listening(Serving("127.0.0.1", 0)) as server, contextlib.ExitStack() as opened:
+    with listening(ServerSettings("127.0.0.1", 0)) as server, contextlib.ExitStack() as opened:
         others = [opened.enter_context(socket.create_connection(server.getsockname())) for _ in range(clients)]
         for one in others:
             one.sendall(b"GET / HTTP/1.1\r\nHost: x\r\n\r\n")
@@ -312,7 +311,7 @@ def test_the_event_loop_is_quiet() -> None:
     import threading
 
     before = {t.name for t in threading.enumerate()}
-    with Dashboard(Serving("127.0.0.1", 0)):
+    with Dashboard(ServerSettings("127.0.0.1", 0)):
         pass
     until(lambda: {t.name for t in threading.enumerate()} <= before, "the threads to end")
     with pytest.raises(RuntimeError):

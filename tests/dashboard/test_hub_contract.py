@@ -21,9 +21,8 @@ from livebode.dashboard.frames import KINDS, frame
 from livebode.dashboard.hub import EVENTS_MAX, ITEMS_MAX, VALUES_MAX
 from livebode.dashboard.notices import CAUSES_MAX, EventCauses, event_id
 from livebode.dashboard.quantities import QUANTITIES
-from livebode.dashboard.recent import RECORDED_VALUES_MAX, RecentResponses
+from livebode.dashboard.recent import POINTS_MAX, RECORDED_VALUES_MAX, ModelTrend, RecentResponses, TrendRows
 from livebode.dashboard.state import State
-from livebode.dashboard.trends import POINTS_MAX, ModelTrend, TrendRows
 from livebode.runtime import ClockSet, RunControl, RunEnded, RunStarted, TrackerResults
 from livebode.simulation.two_mass_loop import RATE_HZ
 from livebode.sources.live import LiveBlock

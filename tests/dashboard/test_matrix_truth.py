@@ -13,8 +13,8 @@ from playwright.sync_api import Browser
 from livebode.analysis import Overview
 from livebode.configuration import Axis
 from livebode.core import Block, Lines, MatrixResponses
-from livebode.dashboard import Dashboard, Serving
-from livebode.mimo import MatrixExcitation
+from livebode.dashboard import Dashboard, ServerSettings
+from livebode.excitation import MatrixExcitation
 from livebode.records import RunRecord
 from livebode.runtime import Destination, RunControl, RunEnded, RunStarted, run
 from livebode.simulation import GantryLoop
@@ -52,7 +52,7 @@ def gantry(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def tab(browser: Browser, gantry: Path) -> Iterator[Tab]:
-    dashboard = Dashboard(Serving("127.0.0.1", 0))
+    dashboard = Dashboard(ServerSettings("127.0.0.1", 0))
     dashboard.view(gantry)
     with dashboard, Tab(browser, dashboard.url) as found:
         found.until("matrix.answer && document.querySelector('[data-axis]')")
@@ -121,7 +121,7 @@ def test_lines_at_which_inputs_do_not_separate_have_no_value_and_the_reason(brow
     newest = matrix(directory)[-1:]
     valid = newest.valid[0, :, 0]
     assert 0 < valid.sum() < len(LINES)
-    dashboard = Dashboard(Serving("127.0.0.1", 0))
+    dashboard = Dashboard(ServerSettings("127.0.0.1", 0))
     dashboard.view(directory)
     with dashboard, Tab(browser, dashboard.url) as tab:
         tab.until("matrix.answer && document.querySelector('[data-axis]')")
@@ -134,7 +134,7 @@ def test_lines_at_which_inputs_do_not_separate_have_no_value_and_the_reason(brow
 
 
 def test_axe_finds_nothing_and_nothing_is_wider_than_a_telephone(browser: Browser, gantry: Path) -> None:
-    dashboard = Dashboard(Serving("127.0.0.1", 0))
+    dashboard = Dashboard(ServerSettings("127.0.0.1", 0))
     dashboard.view(gantry)
     with dashboard, with_axe(browser) as tab:
         tab.page.goto(dashboard.url)
@@ -150,7 +150,7 @@ def test_axe_finds_nothing_and_nothing_is_wider_than_a_telephone(browser: Browse
 def test_a_live_matrix_run_shows_each_entry(browser: Browser, gantry: Path) -> None:
     record = RunRecord.open(gantry, matrix=True)
     rows = record.matrix()
-    dashboard = Dashboard(Serving("127.0.0.1", 0))
+    dashboard = Dashboard(ServerSettings("127.0.0.1", 0))
     hub = dashboard.hub("gantry", [(o, i) for o in OUTPUTS for i in INPUTS])
     with dashboard, Tab(browser, dashboard.url, wait=False) as tab:
         hub(RunStarted(gantry, record.summary, RunControl(), Overview()))

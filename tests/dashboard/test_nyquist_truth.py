@@ -11,7 +11,7 @@ import pytest
 from playwright.sync_api import Browser
 
 from livebode.configuration import LoopSection
-from livebode.dashboard import Dashboard, Serving
+from livebode.dashboard import Dashboard, ServerSettings
 from livebode.records import RunRecord
 from tests.support.browser import Tab
 from tests.support.dashboards import LINES, LOOP, RATE_HZ, Watched
@@ -31,7 +31,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def tab(browser: Browser, run: Path) -> Iterator[Tab]:
-    dashboard = Dashboard(Serving("127.0.0.1", 0))
+    dashboard = Dashboard(ServerSettings("127.0.0.1", 0))
     dashboard.view(run)
     with dashboard, Tab(browser, dashboard.url + "#quantity=open+loop") as found:
         found.until("bode.drawn.model && bode.known.margins().length")
@@ -196,27 +196,6 @@ def test_a_picture_and_the_print_show_the_chosen_plot(tab: Tab) -> None:
     assert tab.page.locator("#sheet canvas").count() == 3
     tab.page.evaluate("dispatchEvent(new Event('afterprint'))")
     assert scales(tab) == pytest.approx(before)
-
-
-def test_margins_of_a_known_loop(tab: Tab) -> None:
-    """L = K / (jr (1 + jr)²) with r = f/10: −180° at 10 Hz, gain margin 2/K; |L| = 1 where r (1 + r²) = K."""
-    f = np.geomspace(1, 100, 2001)
-    r, gain = f / 10, 0.5
-    value = gain / (1j * r * (1 + 1j * r) ** 2)
-    db, deg = 20 * np.log10(np.abs(value)), np.degrees(np.unwrap(np.angle(value)))
-    found = tab.page.evaluate(
-        """async ([hz, db, deg]) => {
-          const { marginsOf } = await import("/static/whatif.js");
-          return marginsOf(hz, db, deg, hz.map(() => 0.1));
-        }""",
-        [f.tolist(), db.tolist(), deg.tolist()],
-    )
-    crossing = next(float(x.real) for x in np.roots([1, 0, 1, -gain]) if abs(x.imag) < 1e-12)
-    phase = 180 - 90 - 2 * np.degrees(np.arctan(crossing))
-    assert [one["kind"] for one in found] == ["gain", "phase"]
-    assert [one["hz"] for one in found] == pytest.approx([10, 10 * crossing], rel=1e-5)
-    assert [one["value"] for one in found] == pytest.approx([20 * np.log10(2 / gain), phase], abs=1e-3)
-    assert [one["reach"] for one in found] == pytest.approx([0.1, 0.1])
 
 
 def test_a_reload_keeps_the_plot_and_its_neighbourhood_of_minus_one(tab: Tab) -> None:

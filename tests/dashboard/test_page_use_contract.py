@@ -17,7 +17,7 @@ from playwright.sync_api import Browser
 from scipy.io import loadmat
 
 from livebode.core import Event, Lines
-from livebode.dashboard import Dashboard, Hub, Serving
+from livebode.dashboard import Dashboard, Hub, ServerSettings
 from livebode.records import RunRecord
 from livebode.simulation.two_mass_loop import RATE_HZ
 from tests.support.browser import TABLET, Tab, until
@@ -96,7 +96,7 @@ def test_freezing_pausing_and_scrolling_back(browser: Browser, watched: Watched)
 @contextlib.contextmanager
 def page_of_a_run(browser: Browser, directory: Path) -> Iterator[tuple[Hub, Tab]]:
     """A page on which a run has begun; the hub begins others."""
-    dashboard = Dashboard(Serving("127.0.0.1", 0))
+    dashboard = Dashboard(ServerSettings("127.0.0.1", 0))
     hub = dashboard.hub("axis")
     begin(hub, directory, LINES)
     with dashboard, Tab(browser, dashboard.url) as tab:
@@ -144,7 +144,7 @@ def test_the_largest_sensitivity_is_not_shown_of_another_moment(browser: Browser
 
 def test_a_measured_point_near_zero_stays_in_its_scale(browser: Browser, tmp_path: Path) -> None:
     """Its band reaches to zero, which must not squeeze the other points to a stripe."""
-    dashboard = Dashboard(Serving("127.0.0.1", 0))
+    dashboard = Dashboard(ServerSettings("127.0.0.1", 0))
     hub = dashboard.hub("axis")
     begin(hub, tmp_path, LINES)
     rows = made(1, LINES, hole=0.0, unit="")
@@ -159,7 +159,7 @@ def test_a_measured_point_near_zero_stays_in_its_scale(browser: Browser, tmp_pat
 
 
 def test_a_map_of_nothing_valid_has_no_scale(browser: Browser, whole: Path) -> None:
-    dashboard = Dashboard(Serving("127.0.0.1", 0))
+    dashboard = Dashboard(ServerSettings("127.0.0.1", 0))
     dashboard.view(whole)
     with dashboard, Tab(browser, dashboard.url) as tab:
         rows = "{ rows: 1, columns: 13, timeS: [347.9], schedule: [NaN], magnitude: Array(13).fill(NaN) }"
@@ -176,7 +176,7 @@ def test_a_map_of_nothing_valid_has_no_scale(browser: Browser, whole: Path) -> N
 
 
 def test_every_key_does_what_the_help_lists(browser: Browser, whole: Path) -> None:
-    dashboard = Dashboard(Serving("127.0.0.1", 0))
+    dashboard = Dashboard(ServerSettings("127.0.0.1", 0))
     dashboard.view(whole)
     with dashboard, Tab(browser, dashboard.url) as tab:
         page = tab.page
@@ -227,7 +227,7 @@ def test_every_key_does_what_the_help_lists(browser: Browser, whole: Path) -> No
 
 
 def test_zooming_with_the_mouse_and_back(browser: Browser, whole: Path) -> None:
-    dashboard = Dashboard(Serving("127.0.0.1", 0))
+    dashboard = Dashboard(ServerSettings("127.0.0.1", 0))
     dashboard.view(whole)
     with dashboard, Tab(browser, dashboard.url) as tab:
         box = tab.page.locator("#magnitude .u-over").bounding_box()
@@ -246,7 +246,7 @@ def test_zooming_with_the_mouse_and_back(browser: Browser, whole: Path) -> None:
 
 
 def test_the_page_is_usable_by_touch_on_a_tablet(browser: Browser, whole: Path) -> None:
-    dashboard = Dashboard(Serving("127.0.0.1", 0))
+    dashboard = Dashboard(ServerSettings("127.0.0.1", 0))
     dashboard.view(whole)
     with dashboard, Tab(browser, dashboard.url, viewport=TABLET, has_touch=True, is_mobile=True) as tab:
         box = tab.page.locator("#magnitude .u-over").bounding_box()
@@ -296,7 +296,7 @@ def test_the_page_is_usable_by_touch_on_a_tablet(browser: Browser, whole: Path) 
 
 def test_downloads_hold_the_data(browser: Browser, whole: Path, tmp_path: Path) -> None:
     run = RunRecord.open(whole).responses()
-    dashboard = Dashboard(Serving("127.0.0.1", 0))
+    dashboard = Dashboard(ServerSettings("127.0.0.1", 0))
     dashboard.view(whole)
 
     def get(tab: Tab, words: str) -> Path:
@@ -357,7 +357,7 @@ def test_acknowledging_is_recorded(browser: Browser, watched: Watched) -> None:
 
 
 def test_a_finished_run_is_only_looked_at(browser: Browser, whole: Path) -> None:
-    dashboard = Dashboard(Serving("127.0.0.1", 0))
+    dashboard = Dashboard(ServerSettings("127.0.0.1", 0))
     dashboard.view(whole)
     with dashboard, Tab(browser, dashboard.url) as tab:
         assert tab.page.locator("#status-text").inner_text() == "run · recorded"
@@ -373,7 +373,7 @@ def test_a_finished_run_is_only_looked_at(browser: Browser, whole: Path) -> None
 @contextlib.contextmanager
 def two_axes(browser: Browser, whole: Path, without_loop: Path) -> Iterator[Tab]:
     """A page of two finished runs, of which the second does not describe its loop."""
-    dashboard = Dashboard(Serving("127.0.0.1", 0))
+    dashboard = Dashboard(ServerSettings("127.0.0.1", 0))
     dashboard.view(whole)
     dashboard.view(without_loop)
     with dashboard, Tab(browser, dashboard.url) as tab:
@@ -482,7 +482,7 @@ def luminance(colour: str) -> float:
 
 
 def test_lines_of_a_hundred_are_chosen(browser: Browser, whole: Path) -> None:
-    dashboard = Dashboard(Serving("127.0.0.1", 0))
+    dashboard = Dashboard(ServerSettings("127.0.0.1", 0))
     dashboard.view(whole)
     with dashboard, Tab(browser, dashboard.url) as tab:
         assert tab.page.locator("#tracking-lines button").count() == len(LINES)

@@ -22,7 +22,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
 from livebode.core import LivebodeError
-from livebode.dashboard import Dashboard, Serving, alarm_request, queries
+from livebode.dashboard import Dashboard, ServerSettings, alarm_request, queries
 from tests.support.dashboards import Watched
 from tests.support.peers.peer import PATIENCE_S
 
@@ -224,7 +224,7 @@ def test_messages_leave_the_socket_or_close_it(watched: Watched, capfd: pytest.C
 
 def test_a_record_that_cannot_be_read_is_a_sentence(tmp_path: Path) -> None:
     with pytest.raises(LivebodeError, match="not the directory of a run"):
-        Dashboard(Serving("127.0.0.1", 0)).view(tmp_path)
+        Dashboard(ServerSettings("127.0.0.1", 0)).view(tmp_path)
 
 
 _CALLS: list[tuple[str, dict[str, object]]] = [
@@ -254,7 +254,7 @@ _TEXTS = st.one_of(
 def all_runs(watched: Watched) -> Iterator[tuple[str, list[str]]]:
     """The page of all runs, and what the dashboard reports on the terminal."""
     messages = list[str]()
-    dashboard = Dashboard(Serving("127.0.0.1", 0), messages.append)
+    dashboard = Dashboard(ServerSettings("127.0.0.1", 0), messages.append)
     dashboard.view_all(watched.directory.parent)
     with dashboard:
         yield dashboard.url, messages

@@ -18,7 +18,7 @@ import pytest
 from starlette.applications import Starlette
 
 from livebode.core import RecordError, ServerError
-from livebode.dashboard import Dashboard, Serving
+from livebode.dashboard import Dashboard, ServerSettings
 from livebode.dashboard.access import Access
 from livebode.dashboard.run_catalogue import RunCatalogue
 from livebode.dashboard.runs_pages import OPEN_MAX, OpenedRuns
@@ -30,7 +30,7 @@ from tests.support.guarded import TOKEN, VIEWER
 from tests.support.many_runs import ALARM, BEGUN, DAY_S, SOFTER, ask, run_page, source_run, weeks
 from tools.run_copies import copy_run
 
-SERVING = Serving("127.0.0.1", 0)
+SERVING = ServerSettings("127.0.0.1", 0)
 LISTED = ["broken", *(f"day {i}" for i in range(6)), "no clock"]
 
 
@@ -40,7 +40,7 @@ def source() -> Path:
 
 
 @contextlib.contextmanager
-def serving(folder: Path, of: Serving = SERVING) -> Iterator[str]:
+def serving(folder: Path, of: ServerSettings = SERVING) -> Iterator[str]:
     dashboard = Dashboard(of)
     dashboard.view_all(folder)
     with dashboard:

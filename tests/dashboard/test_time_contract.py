@@ -18,7 +18,7 @@ from playwright.sync_api import Browser
 from pypdf import PageObject, PdfReader
 
 from livebode.core import Event, Lines
-from livebode.dashboard import Dashboard, Serving
+from livebode.dashboard import Dashboard, ServerSettings
 from livebode.language import Message, Moment
 from livebode.records import RunRecord
 from livebode.runtime import ClockSet
@@ -45,7 +45,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def dashboard(whole: Path) -> Iterator[Dashboard]:
     """Hours across the two changes of the clocks in Europe, and a finished recording without a date."""
-    found = Dashboard(Serving("127.0.0.1", 0))
+    found = Dashboard(ServerSettings("127.0.0.1", 0))
     for name, (start, hours) in {"autumn": AUTUMN, "spring": SPRING}.items():
         hub = found.hub(name)
         rows = replace(made(ROWS, LINES, hole=0.0, unit=""), time_s=np.linspace(0, 3600 * hours, ROWS))
@@ -396,7 +396,7 @@ def test_a_lost_server_greys_the_plots_and_says_since_when(browser: Browser, tmp
         assert "grayscale(1)" in tab.js(grey)
         status = "document.getElementById('status-text').textContent"
         assert "no connection" in tab.js(status)
-        again = Dashboard(Serving("127.0.0.1", port))
+        again = Dashboard(ServerSettings("127.0.0.1", port))
         watched.end()
         again.view(watched.directory)
         with again:
@@ -407,7 +407,7 @@ def test_a_lost_server_greys_the_plots_and_says_since_when(browser: Browser, tmp
 
 
 def test_a_new_run_ends_the_zoom_of_the_one_before(browser: Browser, tmp_path: Path) -> None:
-    found = Dashboard(Serving("127.0.0.1", 0))
+    found = Dashboard(ServerSettings("127.0.0.1", 0))
     hub = found.hub("axis")
     begin(hub, tmp_path, LINES)
     with found, Tab(browser, found.url) as tab:

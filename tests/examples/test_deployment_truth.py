@@ -17,7 +17,7 @@ from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
 from livebode.configuration import ServeSection
-from livebode.dashboard import Serving
+from livebode.dashboard import ServerSettings
 from tests.support.dashboards import Watched
 from tests.support.guarded import TOKEN, port_of
 from tests.support.peers.certificates import Authority
@@ -78,7 +78,7 @@ def test_the_dashboard_works_behind_nginx_with_a_secure_cookie_and_without_other
     (tmp_path / "nginx").mkdir()
     trust = ssl.create_default_context(cafile=str(authority.file))
     with (
-        Watched(tmp_path / "run", Serving.of(section)) as watched,
+        Watched(tmp_path / "run", ServerSettings.of(section)) as watched,
         proxied(tmp_path / "nginx", port_of(watched), certificate, key) as port,
     ):
         watched.go(6000)

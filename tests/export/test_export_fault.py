@@ -13,7 +13,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from livebode.core import Lines, OutputError, RecordError, SignalError
-from livebode.export import at, save, write_csv, write_mat, write_netcdf, write_uff
+from livebode.export import nearest_response, save, write_csv, write_mat, write_netcdf, write_uff
 from livebode.fitting import mean_response
 from tests.support.command import livebode, signals, write_parquet
 from tests.support.errors import refused
@@ -126,7 +126,7 @@ def test_a_run_without_responses_is_refused(tmp_path: Path) -> None:
             write(tmp_path / "a", iter([]))
     invalid = made(5, LINES, hole=1.0)
     with refused(SignalError, "no-valid-response"):
-        at([invalid], 0.0)
+        nearest_response([invalid], 0.0)
     with refused(SignalError, "no-valid-response"):
         mean_response([invalid])
     invalid.valid[:, 0], invalid.value[:, 0] = True, 1.0

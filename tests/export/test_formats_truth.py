@@ -16,7 +16,7 @@ import xarray as xr
 from hypothesis import given, settings
 
 from livebode.core import Lines, Responses, SignalError
-from livebode.export import at, write_csv, write_mat, write_netcdf, write_uff
+from livebode.export import nearest_response, write_csv, write_mat, write_netcdf, write_uff
 from livebode.sources import open_log
 from tests.support.errors import refused
 from tests.support.exact_csv import read_exactly
@@ -162,7 +162,7 @@ def test_uff_is_evenly_spaced_where_that_is_exact(tmp_path: Path) -> None:
 
 def test_one_response_of_many_converts_to_python_control() -> None:
     responses = made(30, LINES, hole=0.2)
-    response = at([responses], responses.time_s[11])
+    response = nearest_response([responses], responses.time_s[11])
     frd = response.to_frd()
     assert isinstance(frd, control.FrequencyResponseData)
     with warnings.catch_warnings():

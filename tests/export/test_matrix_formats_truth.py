@@ -102,6 +102,8 @@ def test_mat_has_the_shapes_that_frd_and_idfrd_take(
     covariance = np.einsum("opkr,ijkr->rkoipj", noise, spread)
     np.testing.assert_allclose(covariance, responses.covariance[:, kept], rtol=1e-13)
     same(struct["valid"].reshape(nu, lines, rows), responses.valid[:, kept].transpose(2, 1, 0))
+    same(struct["reason"].reshape(nu, lines, rows), responses.reason[:, kept].transpose(2, 1, 0))
+    assert ["".join(cell[0]) for cell in struct["reasons"]] == ["", "incomplete", "not excited", "not separated"]
     assert [cell[0].item() for cell in struct["InputName"]] == list(responses.inputs)
     assert [cell[0].item() for cell in struct["OutputName"]] == list(responses.outputs)
     if responses.units:

@@ -64,7 +64,7 @@ def test_noise_alone_is_rarely_taken_for_drift(windows: int) -> None:
     for _ in range(400):
         test = DriftTest(LINES)
         test.add(record(rng, windows, 0.0)[0])
-        alarms += test.result().found
+        alarms += test.result().significant
     assert FALSE_ALARM == 0.01
     assert alarms <= 12
 
@@ -92,7 +92,7 @@ def test_the_change_from_the_beginning_to_the_end_is_measured() -> None:
     test.add(responses)
     found = test.result()
     change = truth(np.array([1.0]))[0] - truth(np.array([0.0]))[0]
-    assert found.found
+    assert found.significant
     assert np.sum(np.abs(found.change - change) > 3 * found.sigma) <= 1
 
 
@@ -116,7 +116,7 @@ def test_a_response_that_may_depend_on_the_position_is_no_drift(way_m: float, fo
     responses, _ = record(np.random.default_rng(6), 60, 0.1)
     test = DriftTest(LINES)
     test.add(Responses(**{**vars(responses), "schedule": 0.8 + way_m * np.linspace(0, 1, 60)}))
-    assert test.result().found == found
+    assert test.result().significant == found
 
 
 def test_windows_in_parts_give_the_bits_of_windows_one_by_one() -> None:

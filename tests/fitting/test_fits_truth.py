@@ -10,7 +10,7 @@ import pytest
 from livebode.core import Block, Lines, Parameters, Response, Responses, SignalError, UsageError
 from livebode.estimation import Settings, Tracker
 from livebode.fitting import EvaluationGrid, Fitter, Rigid, ThreeMass, TwoMass, TwoMassGain, fit, mean_response
-from livebode.fitting.problem import Measured, Problem
+from livebode.fitting.problem import MeasuredRows, Problem
 from livebode.simulation import BeltAxis, Friction, Mechanics, Sensor, SimulatedAxis, Standstill
 from tests.support.axes import MULTISINE
 from tests.support.errors import refused
@@ -29,7 +29,7 @@ def bound_of(model, values, lines: Lines, relative: float) -> np.ndarray:
     sigma = relative * np.abs(exact)
     problem = Problem(model, grid)
     weight = np.sqrt(2) / sigma
-    solution, _ = problem.solve(Measured(exact, sigma, sigma > 0), weight, np.asarray(values)[np.newaxis])
+    solution, _ = problem.solve(MeasuredRows(exact, sigma, sigma > 0), weight, np.asarray(values)[np.newaxis])
     left = weight[0][:, np.newaxis] * solution.slope[0]
     return np.diag(np.linalg.inv((left.conj().T @ left).real))
 

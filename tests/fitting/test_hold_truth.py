@@ -10,9 +10,8 @@ from hypothesis import strategies as st
 
 from livebode.core import FitError, UsageError
 from livebode.fitting import EvaluationGrid, Parameter, Rigid, ThreeMass, Transfer, TwoMass, TwoMassGain, two_masses
-from livebode.fitting.hold import to_continuous, to_discrete
 from livebode.fitting.modal import chain_of
-from livebode.fitting.transfer import roots
+from livebode.fitting.transfer import roots, to_continuous, to_discrete
 from livebode.simulation import BeltAxis, Mechanics
 from tests.support.errors import refused
 from tests.support.fitted import Pendulum

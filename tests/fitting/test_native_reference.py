@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from livebode.fitting import EvaluationGrid, Rigid, TwoMass, TwoMassGain
-from livebode.fitting.problem import Measured, Problem
+from livebode.fitting.problem import MeasuredRows, Problem
 from livebode.fitting.rows import fit_rows
 from tests.support.fitted import TRUTH
 
@@ -56,7 +56,7 @@ def test_values_bounds_and_status_agree(
     truths = np.concatenate([model.at(row[np.newaxis], GRID) for row in values])
     sigma = 0.01 * np.abs(truths)
     value = truths + sigma * (rng.standard_normal(truths.shape) + 1j * rng.standard_normal(truths.shape)) / np.sqrt(2)
-    measured, dof = Measured(value, sigma, rng.random(truths.shape) > 0.1), np.full(ROWS, 12.0)
+    measured, dof = MeasuredRows(value, sigma, rng.random(truths.shape) > 0.1), np.full(ROWS, 12.0)
     one, other = (Problem(of(**options), GRID, held, ["delay"] * free_delay) for of in (native, general))
     assert one.native is not None
     assert other.native is None

@@ -8,7 +8,7 @@ import pytest
 
 from livebode.core import FitError, Lines, Responses, UsageError
 from livebode.fitting import EvaluationGrid, Rational, TwoMass, fit_rational, rational_of
-from livebode.fitting.hold import to_discrete
+from livebode.fitting.transfer import to_discrete
 from tests.support.errors import refused
 from tests.support.fitted import TRUTH, noisy
 

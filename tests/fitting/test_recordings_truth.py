@@ -11,7 +11,7 @@ import pytest
 from livebode.core import Block, Lines, Responses, SignalError
 from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine
-from livebode.fitting import Between, RecordingsMean
+from livebode.fitting import RecordingScatter, RecordingsMean
 from tools import bla_reference as reference
 
 RATE_HZ, WINDOW = 1000.0, 100
@@ -25,7 +25,7 @@ def tracked(lines: Lines, w: np.ndarray, u: np.ndarray, y: np.ndarray, start: in
     return Tracker(settings).process(Block(np.array([w, u, y]), ("w", "u", "y"), RATE_HZ, start=start))
 
 
-def mean_of(parts: list[Responses], *, realisations: bool = False) -> tuple[Responses, Between]:
+def mean_of(parts: list[Responses], *, realisations: bool = False) -> tuple[Responses, RecordingScatter]:
     mean = RecordingsMean([int(part.first[0]) for part in parts], realisations=realisations)
     for part in Responses.join(parts), parts[0][0:0]:
         mean.add(part)

@@ -41,7 +41,7 @@ def test_nothing_but_the_summary_is_read_at_first(run: Run, tmp_path: Path) -> N
     (tmp_path / "run.json").write_text((run.path / "run.json").read_text())
     opened = Run(str(tmp_path))
     assert len(opened.lines) == 13
-    with pytest.warns(livebode.core.DamageWarning, match=r"responses.parquet is damaged"):
+    with pytest.warns(livebode.core.DamageWarning, match=r"manifest.jsonl is damaged: the file is missing"):
         assert len(opened.responses) == 0
     with refused(RecordError, "not-a-run"):
         Run(tmp_path / "none")

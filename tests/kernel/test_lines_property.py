@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from livebode.estimation.moments import weights_of
+from livebode.estimation.periods import weights_of
 from livebode.kernel import (
     MEANS,
     NOISE_LARGER,

@@ -10,7 +10,7 @@ from pathlib import Path
 from playwright.sync_api import Browser
 
 from livebode.core import RunClock, moment, moments_by
-from livebode.dashboard import Dashboard, Serving
+from livebode.dashboard import Dashboard, ServerSettings
 from livebode.language import Message, catalogue, for_page, in_language, worded
 from tests.support.browser import Tab
 from tests.support.dashboards import Watched
@@ -33,7 +33,10 @@ def test_the_page_words_what_python_words(browser: Browser) -> None:
             "no response",
             "a channel",
         ]
-    with Dashboard(Serving("127.0.0.1", 0, language="de")) as dashboard, Tab(browser, dashboard.url, wait=False) as tab:
+    with (
+        Dashboard(ServerSettings("127.0.0.1", 0, language="de")) as dashboard,
+        Tab(browser, dashboard.url, wait=False) as tab,
+    ):
         found = tab.page.evaluate(
             "async (all) => all.map((await import('/static/worded.js')).worded)",
             [for_page(message) for message in messages],
@@ -78,7 +81,7 @@ _TEXTS = """() => {
 
 def test_the_page_follows_the_configuration_and_then_the_choice_of_its_user(browser: Browser) -> None:
     with (
-        Dashboard(Serving("127.0.0.1", 0, language="zh-CN")) as dashboard,
+        Dashboard(ServerSettings("127.0.0.1", 0, language="zh-CN")) as dashboard,
         Tab(browser, dashboard.url, wait=False, locale="de-AT") as tab,
     ):
         label = tab.page.locator("#axis-label")

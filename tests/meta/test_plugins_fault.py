@@ -5,15 +5,20 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from collections.abc import Sequence
 from importlib.metadata import entry_points
 from pathlib import Path
+from urllib.parse import urljoin
 
 import numpy as np
 import pytest
+from playwright.sync_api import Browser
 
 from livebode import plugins
 from livebode_drives.formats import FORMATS
 from tests.support import recordings
+from tests.support.answers import Answer, answers
+from tests.support.browser import Tab
 from tests.support.command import signals, write_parquet
 
 BROKEN = {
@@ -24,18 +29,35 @@ BROKEN = {
 }
 
 
-@pytest.fixture(params=BROKEN)
-def packages(request: pytest.FixtureRequest, tmp_path: Path) -> tuple[Path, str]:
+NO_PICTURES = ["matplotlib"]
+RUN = ("--excitation", "w", "--input", "u", "--output", "y", "--lines", "50,100,200", "--window", 100)
+
+
+@pytest.fixture(scope="module", params=BROKEN)
+def packages(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     """A directory of packages with one that is broken in every group, and the reason."""
+    folder = tmp_path_factory.mktemp("packages")
     code, reason = BROKEN[request.param]
     if request.param != "missing":
-        (tmp_path / "livebode_broken.py").write_text(code)
-    metadata = tmp_path / "livebode_broken-1.2.dist-info"
+        (folder / "livebode_broken.py").write_text(code)
+    metadata = folder / "livebode_broken-1.2.dist-info"
     metadata.mkdir()
     (metadata / "METADATA").write_text("Metadata-Version: 2.1\nName: livebode-broken\nVersion: 1.2\n")
     groups = [f"[livebode.{group}]\nbroken = livebode_broken:TABLE\n" for group in plugins.GROUPS]
     (metadata / "entry_points.txt").write_text("\n".join(groups))
-    return tmp_path, reason
+    return folder, reason
+
+
+@pytest.fixture(scope="module")
+def broken(packages: tuple[Path, str]) -> dict[str, Answer]:
+    """Answers to a run and to the doctor, who names what the run has found too."""
+    folder, _ = packages
+    log = write_parquet(folder / "log.parquet", signals())
+    run, doctor = answers(
+        ("run", log, *RUN, "--out", folder / "run"), ("doctor", "--runs", folder, "--json"),
+        absent=NO_PICTURES, path=[folder],
+    )  # fmt: skip
+    return {"run": run, "doctor": doctor}
 
 
 def livebode(packages: Path, *words: object) -> subprocess.CompletedProcess[str]:
@@ -43,13 +65,12 @@ def livebode(packages: Path, *words: object) -> subprocess.CompletedProcess[str]
     return subprocess.run([sys.executable, "-c", code, *map(str, words)], capture_output=True, text=True, check=False)
 
 
-def test_everything_else_works_and_each_group_that_is_used_costs_one_sentence(packages: tuple[Path, str]) -> None:
-    folder, reason = packages
-    log = write_parquet(folder / "log.parquet", signals())
-    given = ("--excitation", "w", "--input", "u", "--output", "y", "--lines", "50,100,200", "--window", 100)
-    done = livebode(folder, "run", log, *given, "--out", folder / "run")
-    assert done.returncode == 0
-    said = done.stderr.splitlines()
+def test_everything_else_works_and_each_group_that_is_used_costs_one_sentence(
+    packages: tuple[Path, str], broken: dict[str, Answer]
+) -> None:
+    _, reason = packages
+    assert broken["run"].code == 0
+    said = broken["run"].err.splitlines()
     assert {line.split(" of the plug-in ")[0] for line in said} <= {
         f"livebode: the {group}" for group in plugins.GROUPS
     }
@@ -75,9 +96,9 @@ def test_the_version_does_not_look_for_plugins(packages: tuple[Path, str]) -> No
     assert (done.returncode, done.stderr) == (0, "")
 
 
-def test_the_doctor_names_it(packages: tuple[Path, str]) -> None:
-    folder, reason = packages
-    checks = json.loads(livebode(folder, "doctor", "--runs", folder, "--json").stdout)["checks"]
+def test_the_doctor_names_it(packages: tuple[Path, str], broken: dict[str, Answer]) -> None:
+    _, reason = packages
+    checks = json.loads(broken["doctor"].out)["checks"]
     (check,) = [check for check in checks if check["name"] == "plug-ins"]
     assert check["verdict"] == "warning"
     assert len(check["facts"]["problems"]) == len(plugins.GROUPS)
@@ -90,9 +111,9 @@ def test_a_name_that_livebode_has_stays_its_own(tmp_path: Path) -> None:
     metadata.mkdir()
     (metadata / "METADATA").write_text("Metadata-Version: 2.1\nName: livebode-other\nVersion: 1\n")
     (metadata / "entry_points.txt").write_text("[livebode.commands]\nother = livebode_other:TABLE\n")
-    assert "Fit a model to the response of a run" in livebode(tmp_path, "--help").stdout
-    told = " ".join(livebode(tmp_path, "doctor", "--runs", tmp_path).stdout.split())
-    assert "'fit' in the commands of livebode-other is not used" in told
+    help_, doctor = answers(["--help"], ["doctor", "--runs", tmp_path], path=[tmp_path])
+    assert "Fit a model to the response of a run" in help_.out
+    assert "'fit' in the commands of livebode-other is not used" in " ".join(doctor.out.split())
 
 
 def test_an_error_of_its_command_is_one_line_and_in_the_log(tmp_path: Path) -> None:
@@ -111,84 +132,107 @@ def test_an_error_of_its_command_is_one_line_and_in_the_log(tmp_path: Path) -> N
     assert "ERROR livebode.livebode_other: usage.missing: nothing is there" in (tmp_path / "log").read_text("utf-8")
 
 
-def without(wing: str, *words: object) -> subprocess.CompletedProcess[str]:
-    """A command where this wing of livebode was left out of the installation."""
-    code = f"import sys; sys.modules['livebode_{wing}'] = None; from livebode.cli import main; main()"
-    return subprocess.run([sys.executable, "-c", code, *map(str, words)], capture_output=True, text=True, check=False)
+def without(wing: str, *commands: Sequence[object], others: Sequence[str] = ()) -> list[Answer]:
+    """Commands where this wing of livebode was left out of the installation, and other packages are not installed."""
+    return answers(*commands, absent=[f"livebode_{wing}", *others])
+
+
+def words(text: str) -> str:
+    """Text of a panel on one line."""
+    return " ".join(text.replace("|", " ").split())
+
+
+@pytest.fixture
+def log(tmp_path: Path) -> Path:
+    return write_parquet(tmp_path / "log.parquet", signals())
 
 
 def test_a_wing_that_was_left_out_is_no_fault(tmp_path: Path) -> None:
     axis = tmp_path / "axis.toml"
     axis.write_text('source.log = "log.csv"\nsignals = {input = "u", output = "y"}\n[[publish]]\nkind = "webhook"\n')
-    done = without("connect", "doctor", axis, "--receivers", "list")
-    assert done.returncode == 2
-    assert "publish.kind is 'webhook', which is not supported; install the wing connect of livebode" in done.stderr
-    assert "cannot be loaded" not in done.stderr
+    (done,) = without("connect", ["doctor", axis, "--receivers", "list"])
+    assert done.code == 2
+    assert "publish.kind is 'webhook', which is not supported; install the wing connect of livebode" in done.err
+    assert "cannot be loaded" not in done.err
 
 
-def test_without_the_wing_control_a_run_has_its_report_and_the_page_the_reason(tmp_path: Path) -> None:
-    log = write_parquet(tmp_path / "log.parquet", signals())
-    given = ["--excitation", "w", "--input", "u", "--output", "y", "--lines", "50,100,200", "--window", "100"]
-    code = """
+def test_without_the_wing_control_a_run_has_its_report_and_its_page(
+    log: Path, tmp_path: Path, browser: Browser
+) -> None:
+    run, report, tune, tested = without(
+        "control",
+        ["run", log, *RUN, "--out", tmp_path / "run"],
+        ["report", tmp_path / "run"],
+        ["tune", tmp_path / "run"],
+        ["report", tmp_path / "run", "--on", log],
+    )
+    assert run.code == 0
+    assert (report.code, report.err) == (0, "")
+    assert "No such command 'tune'" in tune.err
+    assert (tested.code, tested.err.count("\n")) == (2, 1)
+    assert "a model is tested by the wing control, which is not installed; install the wing control" in tested.err
+    serve = """
 import sys
 sys.modules["livebode_control"] = None
-from livebode.cli import main
-from livebode.dashboard.trials import loop_trials
-print(loop_trials().facts())
-main()
+from pathlib import Path
+from livebode.dashboard import Dashboard, ServerSettings
+dashboard = Dashboard(ServerSettings("127.0.0.1", 0))
+dashboard.view(Path(sys.argv[1]))
+with dashboard:
+    print(dashboard.url, flush=True)
+    sys.stdin.read()
 """
-
-    def without(*words: object) -> subprocess.CompletedProcess[str]:
-        command = [sys.executable, "-c", code, *map(str, words)]
-        return subprocess.run(command, capture_output=True, text=True, check=False)
-
-    assert without("run", log, *given, "--out", tmp_path / "run").returncode == 0
-    done = without("report", tmp_path / "run")
-    assert (done.returncode, done.stderr) == (0, "")
-    assert "the wing control is not installed" in done.stdout
-    assert "No such command 'tune'" in without("tune", tmp_path / "run").stderr
-    done = without("report", tmp_path / "run", "--on", log)
-    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
-    assert "a model is tested by the wing control, which is not installed; install the wing control" in done.stderr
+    command = [sys.executable, "-c", serve, str(tmp_path / "run")]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as server:
+        assert server.stdout is not None
+        with Tab(browser, server.stdout.readline().strip()) as tab:
+            tab.until("bode.drawn.measured")
+            assert tab.page.locator("#bode-curves").count() == 1
+            assert tab.page.locator("[id*=what-if]").count() == 0
+            assert tab.page.request.get(urljoin(tab.page.url, "/api/loop?axis=0")).status == 404
+            assert tab.wrong == []
+        server.communicate()
 
 
-@pytest.mark.parametrize("kind", [format_.reader.partition(":")[0].rpartition(".")[2] for format_ in FORMATS])
-def test_a_recording_of_a_wing_that_was_left_out_is_refused(kind: str, tmp_path: Path) -> None:
-    path = recordings.write(kind, tmp_path, recordings.with_time(recordings.signals(50)))
-    done = without("drives", "inspect", path)
-    assert done.returncode == 2
-    (sentence,) = done.stderr.splitlines()
-    assert sentence.startswith(f"livebode: the format of {path} is not supported (it begins with ")
-    assert sentence.endswith("; install the wing drives of livebode, or save its table as CSV")
+def test_recordings_of_a_wing_that_was_left_out_are_refused(tmp_path: Path) -> None:
+    kinds = [format_.reader.partition(":")[0].rpartition(".")[2] for format_ in FORMATS]
+    paths = [recordings.write(kind, tmp_path, recordings.with_time(recordings.signals(50))) for kind in kinds]
+    for path, done in zip(paths, without("drives", *(["inspect", path] for path in paths)), strict=True):
+        assert done.code == 2
+        (sentence,) = done.err.splitlines()
+        assert sentence.startswith(f"livebode: the format of {path} is not supported (it begins with ")
+        assert sentence.endswith("; install the wing drives of livebode, or save its table as CSV")
 
 
-def test_a_source_and_a_command_of_a_wing_that_was_left_out_are_refused(tmp_path: Path) -> None:
+def test_a_source_and_a_command_of_a_wing_that_was_left_out_are_refused(log: Path, tmp_path: Path) -> None:
     axis = tmp_path / "axis.toml"
     axis.write_text('source.url = "mqtt://broker/axis"\nsignals = {input = "u", output = "y"}\n')
-    done = without("drives", "run", axis)
-    assert done.returncode == 2
-    assert "source.url has a scheme that is not supported; give one of udp, tcp, stdin" in done.stderr
-    assert "No such command 'plc'" in without("drives", "plc").stderr
-    assert " plc " not in without("drives", "--help").stdout
-    write_parquet(tmp_path / "log.parquet", signals())
-    assert without("drives", "inspect", tmp_path / "log.parquet").returncode == 0
+    run, plc, help_, inspect = without("drives", ["run", axis], ["plc"], ["--help"], ["inspect", log])
+    assert run.code == 2
+    assert "source.url has a scheme that is not supported; give one of udp, tcp, stdin" in run.err
+    assert "No such command 'plc'" in plc.err
+    assert " plc " not in help_.out
+    assert inspect.code == 0
 
 
 def test_without_the_wing_modes_its_section_is_refused_by_one_sentence(tmp_path: Path) -> None:
     log = write_parquet(tmp_path / "log.parquet", {"t": np.arange(2000) / 100.0, "y": np.ones(2000)})
-    done = without("modes", "run", log, "--output-only", "--output", "y", "--out", tmp_path / "run")
-    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
-    assert "[output_only] belongs to a kind of estimate that is not installed; install the wing modes" in done.stderr
+    (done,) = without("modes", ["run", log, "--output-only", "--output", "y", "--out", tmp_path / "run"])
+    assert (done.code, done.err.count("\n")) == (2, 1)
+    assert "[output_only] belongs to a kind of estimate that is not installed; install the wing modes" in done.err
     assert not (tmp_path / "run").exists()
 
 
 def test_without_the_wing_design_its_commands_and_its_function_name_the_wing(tmp_path: Path) -> None:
-    for name in ("design", "measure"):
-        done = without("design", name, tmp_path / "experiment.toml")
-        sentence = " ".join(done.stderr.replace("│", " ").split())
-        assert done.returncode == 2
-        assert f"No such command '{name}'. Its wing may be missing: install the wing design of livebode." in sentence
-    assert "choose axis or archive" in without("design", "doctor", "--schema", "experiment").stderr
+    names = "design", "measure"
+    *refused, schema = without(
+        "design", *([name, tmp_path / "experiment.toml"] for name in names), ["doctor", "--schema", "experiment"]
+    )
+    for name, done in zip(names, refused, strict=True):
+        sentence = f"No such command '{name}'. Its wing may be missing: install the wing design of livebode."
+        assert done.code == 2
+        assert sentence in words(done.err)
+    assert "choose axis or archive" in schema.err
     code = "import sys; sys.modules['livebode_design'] = None; import livebode; livebode.design({})"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.stderr.splitlines()[-1] == (
@@ -197,40 +241,40 @@ def test_without_the_wing_design_its_commands_and_its_function_name_the_wing(tmp
     )
 
 
-def test_without_the_wing_matrix_a_list_of_channels_is_refused_by_one_sentence(tmp_path: Path) -> None:
-    log = write_parquet(tmp_path / "log.parquet", signals())
+def test_without_the_wing_matrix_a_list_of_channels_is_refused_by_one_sentence(log: Path, tmp_path: Path) -> None:
     given = ["--input", "u", "--input", "w", "--output", "y", "--lines", "50,100", "--window", "100"]
-    done = without("matrix", "run", log, *given, "--out", tmp_path / "run")
-    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
-    assert "a list of channels in [signals] belongs to a kind of estimate that is not installed" in done.stderr
-    assert "install the wing matrix of livebode" in done.stderr
+    done, example = without("matrix", ["run", log, *given, "--out", tmp_path / "run"], ["example"])
+    assert (done.code, done.err.count("\n")) == (2, 1)
+    assert "a list of channels in [signals] belongs to a kind of estimate that is not installed" in done.err
+    assert "install the wing matrix of livebode" in done.err
     assert not (tmp_path / "run").exists()
-    assert "a gantry" not in without("matrix", "example").stdout
+    assert "a gantry" not in example.out
 
 
 def test_without_the_wing_of_many_machines_its_commands_and_examples_do_not_exist() -> None:
     commands = ("--help", "example", "fleet status", "doctor --schema archive", "doctor --schema axis")
-    answers = {words: without("plant", *words.split()) for words in commands}
-    assert [done.returncode for done in answers.values()] == [0, 0, 2, 2, 0]
-    assert not any("cannot be loaded" in done.stderr for done in answers.values())
-    assert "fleet" not in answers["--help"].stdout
-    assert "standstill" in answers["example"].stdout
-    assert "hall" not in answers["example"].stdout
-    assert "No such command 'fleet'" in answers["fleet status"].stderr
-    assert "choose axis or experiment or matrix-experiment" in answers["doctor --schema archive"].stderr
+    given = dict(zip(commands, without("plant", *(command.split() for command in commands))))
+    assert [done.code for done in given.values()] == [0, 0, 2, 2, 0]
+    assert not any("cannot be loaded" in done.err for done in given.values())
+    assert "fleet" not in given["--help"].out
+    assert "standstill" in given["example"].out
+    assert "hall" not in given["example"].out
+    assert "No such command 'fleet'" in given["fleet status"].err
+    assert "choose axis or experiment or matrix-experiment" in given["doctor --schema archive"].err
 
 
-def test_without_the_wing_reports_its_commands_and_the_page_say_what_to_install(tmp_path: Path) -> None:
-    log = write_parquet(tmp_path / "log.parquet", signals())
-    given = ["--excitation", "w", "--input", "u", "--output", "y", "--lines", "50,100,200", "--window", "100"]
-    done = without("reports", "run", log, *given, "--out", tmp_path / "run")
-    assert (done.returncode, done.stderr) == (0, "")
-    for command in ("report", "compare"):
-        done = without("reports", command, tmp_path / "run")
-        assert done.returncode == 2
-        sentence = "Its wing may be missing: install the wing reports of livebode."
-        assert f"No such command '{command}'." in done.stderr
-        assert sentence in " ".join(done.stderr.replace("│", " ").split())
+def test_without_the_wing_reports_its_commands_and_the_page_say_what_to_install(log: Path, tmp_path: Path) -> None:
+    run, *refused = without(
+        "reports",
+        ["run", log, *RUN, "--out", tmp_path / "run"],
+        *([command, tmp_path / "run"] for command in ("report", "compare")),
+        others=NO_PICTURES,
+    )
+    assert (run.code, run.err) == (0, "")
+    for command, done in zip(("report", "compare"), refused, strict=True):
+        assert done.code == 2
+        assert f"No such command '{command}'." in done.err
+        assert "Its wing may be missing: install the wing reports of livebode." in words(done.err)
     code = """
 import sys
 sys.modules["livebode_reports"] = None

@@ -32,8 +32,8 @@ WRITING_MODULES = {
         "livebode_reports/files", "livebode_reports/pdf", "tables/parquet_writer",
     ),
     _NEW: (
-        "interface/example_recordings", "livebode_design/designing",
-        "livebode_plant/fleet/credentials", "records/run_directory", "records/table_file",
+        "interface/example_recordings", "livebode_design/experiment_design",
+        "livebode_plant/fleet/connection", "records/run_directory", "records/segments/segment_writer",
     ),
     _TEMPORARY: ("livebode_plant/archive/alone", "livebode_plant/fleet/server", "livebode_plant/fleet/demo"),
     "the null device": ("cli/app", "livebode_plant/archive/clusters"),

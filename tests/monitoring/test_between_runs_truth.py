@@ -10,10 +10,9 @@ import pytest
 from livebode.core import Block, Event
 from livebode.monitoring import DEFAULT_INTERVAL_S, Evidence, LearnedMachine, MachineDetector, MachineMonitor
 from livebode.monitoring.accuracy import ChangeAccuracy
-from livebode.monitoring.between_runs import BetweenRuns, between_runs, chance
+from livebode.monitoring.between_runs import BetweenRuns, RunOffset, between_runs, chance
 from livebode.monitoring.charts import Charts
 from livebode.monitoring.evidence import JUDGED
-from livebode.monitoring.run_offset import RunOffset
 from livebode.simulation import TensionLoss
 from tests.support.axes import LINES
 from tests.support.monitored import NAMES, ideal

@@ -13,8 +13,8 @@ from livebode.monitoring import LearnedMachine
 from livebode.monitoring.evidence import JUDGED
 from livebode.monitoring.model_evidence import ModelEvidence
 from livebode.monitoring.naming import ScoredWindows
-from livebode.monitoring.offset import LocalChange, Offset
 from livebode.monitoring.ripple import Ripple, allowed_for
+from livebode.monitoring.sensitivity import LocalChange, Offset
 from livebode.monitoring.stretches import Stretches, WindowStretch
 from livebode.motion import shaft_position
 from livebode.simulation import Pair, open_belt

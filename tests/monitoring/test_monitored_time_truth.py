@@ -9,8 +9,8 @@ import pytest
 
 from livebode.core import Event
 from livebode.monitoring import DEFAULT_INTERVAL_S, Evidence, MachineDetector
+from livebode.monitoring.accuracy import WINDOWS, detectable, information_for
 from livebode.monitoring.charts import Charts, threshold
-from livebode.monitoring.detectability import WINDOWS, detectable, information_for
 from livebode.monitoring.evidence import JUDGED, SLOW
 from livebode.monitoring.machine_detector import CHARTS
 from livebode.monitoring.monitored_time import WEAK

@@ -11,7 +11,7 @@ import pytest
 from livebode.cli.pictures import tracked_amount
 from livebode.core import Lines, Responses
 from livebode.pictures import bode_figure, quantiles, spread, terminal_bode, tracking_figure, unwrapped, with_holes
-from livebode.pictures.summary import BOUND_C, PROBABILITY
+from livebode.pictures.curves import BOUND_C, PROBABILITY
 from livebode.pictures.tracking import is_falling
 from livebode.preparation import ChannelCheck
 from livebode.runtime.run_counts import RunCounts

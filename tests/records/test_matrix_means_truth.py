@@ -9,9 +9,9 @@ import pytest
 
 from livebode.configuration import Axis
 from livebode.core import Lines, MatrixResponses, Responses
-from livebode.dashboard.matrix_view import views_of
+from livebode.dashboard.run_feed import views_of
+from livebode.excitation import MatrixExcitation
 from livebode.fitting import SharedWindows, binned_means, combined
-from livebode.mimo import MatrixExcitation
 from livebode.records import RunRecord, query, thinned
 from livebode.runtime import Destination, run
 from tests.support.command import write_parquet

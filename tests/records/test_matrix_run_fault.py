@@ -10,6 +10,7 @@ import pytest
 
 from livebode.core import DamageWarning, RecordError
 from livebode.records import MATRIX_TABLES, RunDirectory, RunRecord
+from livebode.records.json_format import VERSIONS
 from livebode.records.summary_file import to_document
 from tests.support.errors import refused
 from tests.support.gantry_runs import gantry_axis, gantry_block, gantry_log, gantry_run
@@ -104,5 +105,5 @@ def test_matrices_are_equal_after_any_number_of_writes(run: Path, tmp_path: Path
         assert RunRecord.open(tmp_path / str(number), matrix=True).matrix().equals(whole)
 
 
-def test_the_version_of_a_matrix_run_is_its_own(run: Path) -> None:
-    assert b'"version": 2' in (run / "run.json").read_bytes()[:60]
+def test_the_version_of_a_matrix_run_is_that_of_every_run(run: Path) -> None:
+    assert f'"version": {VERSIONS["run"]}'.encode() in (run / "run.json").read_bytes()[:60]

@@ -85,8 +85,8 @@ def test_a_finished_run_is_read_exactly(folder: Path) -> None:
     assert run.damages == []
 
 
-def test_a_matrix_run_of_version_2_is_read_exactly() -> None:
-    folder = Path(__file__).parent / "stored" / "matrix-2"
+def test_a_matrix_run_is_read_exactly() -> None:
+    folder = Path(__file__).parent / "stored" / "matrix-3"
     run = RunRecord.open(folder / "piece", matrix=True)
     matrix = run.matrix()
     assert stored_matrix.content(matrix) == json.loads((folder / "expected.json").read_text())
@@ -108,27 +108,28 @@ def test_a_baseline_is_read_exactly(folder: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["run", "manifest", "journal"])
-def test_a_run_of_a_newer_livebode_is_refused_in_one_sentence(name: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("step", "code"), [(1, "newer-version"), (-1, "older-version")])
+def test_a_run_of_another_livebode_is_refused_in_one_sentence(name: str, step: int, code: str, tmp_path: Path) -> None:
     run = Path(shutil.copytree(STORED[-1] / "segments", tmp_path / "run"))
-    newer(run, name)
+    renumber(run, name, VERSIONS[name] + step)
     before = {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
-    with refused(RecordError, "newer-version", format=name, found=VERSIONS[name] + 1, readable=VERSIONS[name]):
+    with refused(RecordError, code, format=name, found=VERSIONS[name] + step, readable=VERSIONS[name]):
         RunRecord.open(run).responses()
-    with refused(RecordError, "newer-version", format=name):
+    with refused(RecordError, code, format=name):
         recover(run)
     assert before == {path: path.read_bytes() for path in before}
 
 
-def newer(run: Path, name: str) -> None:
-    """Give this part of the record the next version."""
-    newest = format_of(name) | {"version": VERSIONS[name] + 1}
+def renumber(run: Path, name: str, version: int) -> None:
+    """Give this part of the record another version."""
+    other = format_of(name) | {"version": version}
     if name == "run":
         for file in (RUN, COPY):
-            (run / file).write_bytes(to_document(read_summary(run)[0] | newest))
+            (run / file).write_bytes(to_document(read_summary(run)[0] | other))
     elif name == "manifest":
         file = run / "manifest.jsonl"
-        file.write_bytes(file.read_bytes().replace(to_line(format_of(name) | {"version": 1}), to_line(newest)))
+        file.write_bytes(file.read_bytes().replace(to_line(format_of(name)), to_line(other)))
     else:
         file = run / "open/000002.journal"
-        old, new = (to_frame(FORMAT, json.dumps(text).encode()) for text in (format_of(name), newest))
+        old, new = (to_frame(FORMAT, json.dumps(text).encode()) for text in (format_of(name), other))
         file.write_bytes(file.read_bytes().replace(old, new))

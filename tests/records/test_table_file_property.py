@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -11,10 +12,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from livebode.records import ColumnTable, table_file
-from livebode.records.table_file import TableFile
+from livebode.records import ColumnTable
+from livebode.records.segments import segment_writer
+from livebode.records.segments.manifest import Segment
+from livebode.records.segments.segment_writer import TableFile
 from livebode.tables import Schema, Table
-from tools.parquet_parts import parts_of
+from tools.parquet_parts import segment_of
 
 TABLE = ColumnTable(Schema.of(sample="int64", time_s="float64", re="float64"), ("time_s",))
 
@@ -29,23 +32,24 @@ def rows(first: int, count: int) -> Table:
 def test_the_parts_are_those_of_the_written_file(
     tmp_path_factory: pytest.TempPathFactory, counts: list[int], group: int
 ) -> None:
-    path = tmp_path_factory.mktemp("table") / "rows.parquet"
+    path = tmp_path_factory.mktemp("table") / "responses.parquet"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(table_file, "_GROUP_ROWS", group)
+        patch.setattr(segment_writer, "GROUP_ROWS", group)
         file = TableFile(path, TABLE)
         for number, count in enumerate(counts):
             file.write(rows(sum(counts[:number]), count))
-        parts = file.close()
-    assert json.loads(json.dumps(parts)) == parts_of(path)
-    assert sum(part["size_bytes"] for part in parts) == path.stat().st_size
+        segment = file.close()
+    assert segment == segment_of(path)
+    assert segment.size_bytes == path.stat().st_size
+    assert Segment.of(1, 1, json.loads(json.dumps(asdict(segment)))) == segment
     assert pq.read_table(path)["sample"].to_pylist() == list(range(sum(counts)))
-    assert file.close() == parts
+    assert file.close() == segment
 
 
 def test_the_error_of_a_group_is_raised_by_the_next_call(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(table_file, "_GROUP_ROWS", 10)
+    monkeypatch.setattr(segment_writer, "GROUP_ROWS", 10)
     other = Table.of({"sample": np.arange(10.0)})
-    file = TableFile(tmp_path / "rows.parquet", TABLE)
+    file = TableFile(tmp_path / "responses.parquet", TABLE)
     file.write(other)
     with pytest.raises(ValueError, match="schema"):
         file.write(rows(0, 10))

@@ -14,7 +14,7 @@ import pytest
 
 from livebode.tables import ParquetFile
 
-STORED = Path(__file__).parent / "stored" / "1"
+STORED = Path(__file__).parent / "stored" / "3"
 SOURCE = Path(__file__).parents[2] / "src" / "livebode"
 NEED_IT = {
     "records/_query.py",
@@ -30,7 +30,7 @@ sys.modules["pyarrow"] = None
 from pathlib import Path
 from urllib.request import urlopen
 import numpy as np
-from livebode.dashboard import Dashboard, Serving
+from livebode.dashboard import Dashboard, ServerSettings
 from livebode.records import RunRecord
 from tests.support import stored
 from tests.support.recorded import check_whole, machine, record_machine
@@ -40,7 +40,7 @@ record_machine(machine(3000), folder / "recorded")
 check_whole(folder / "recorded", 3000)
 run = RunRecord.open(earlier / "segments")
 samples = np.concatenate([[table[name] for name in stored.NAMES] for table in run.tables("samples")], axis=1)
-pages = Dashboard(Serving("127.0.0.1", 0))
+pages = Dashboard(ServerSettings("127.0.0.1", 0))
 pages.view_all(folder)
 with pages, urlopen(f"{pages.url}api/runs") as answer:
     shown = json.load(answer)["names"]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from livebode.core import Lines, UsageError
-from livebode.mimo import MatrixExcitation
+from livebode.excitation import MatrixExcitation
 from livebode.simulation import CoreXY, CoreXYLoop, Gantry, GantryLoop, ModalLoop, ModalMachine, MotorLoop
 from livebode_matrix import MatrixSettings, MatrixTracker
 

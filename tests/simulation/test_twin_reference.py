@@ -25,7 +25,7 @@ from livebode.simulation import (
     TensionLoss,
     engine_settings,
 )
-from livebode.simulation.controller import Controller, Now
+from livebode.simulation.fmu import Controller, Now
 from tests.support.axes import MULTISINE, compiled, fast_stroke
 from tests.twins.plant import Plant
 

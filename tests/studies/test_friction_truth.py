@@ -97,6 +97,21 @@ def test_friction_that_is_not_described_ends_in_a_sentence() -> None:
     assert json.loads(done.err)["error"]["facts"]["argument"] == "position"
 
 
+def test_strokes_slower_than_the_speed_of_standstill_are_left_out(tmp_path: Path) -> None:
+    block = _block(0)
+    table = np.column_stack([np.arange(len(block)) / RATE_HZ, block["F"], block["x"]])
+    np.savetxt(tmp_path / "log.csv", table, delimiter=",", header="time,F,x", comments="", fmt="%.17g")
+    options = ("--input", "F", "--position", "x", "--json", "--slowest", 0.03)
+    found = json.loads(livebode("friction", tmp_path / "log.csv", *options).out)
+    usual = json.loads(livebode("friction", tmp_path / "log.csv", *options[:-2]).out)
+    slow = 2 * 3000 / len(block)  # the strokes of 0.02 m/s
+    assert (found["excluded"] - usual["excluded"]) / (usual["samples"] + usual["excluded"]) == pytest.approx(
+        slow, abs=0.06
+    )
+    for name, true in (("coulomb", COULOMB), ("viscous", VISCOUS)):
+        assert abs(found["parameters"][name]["value"] - true) <= 1.5 * found["parameters"][name]["bound"]
+
+
 def test_a_part_of_the_recording_is_what_another_program_cuts_from_it(tmp_path: Path) -> None:
     block = _block(0)
     names = [channel.name for channel in block.channels]

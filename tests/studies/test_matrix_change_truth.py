@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from livebode.core import FitError, GridError, Lines, MatrixResponses, UsageError
-from livebode.fitting import outputs_of, solve
-from livebode.mimo import mean_matrix
+from livebode.fitting import mean_matrix, outputs_of, solve
 from livebode.simulation import GantryLoop
 from livebode_matrix import (
     MatrixModes,
@@ -25,9 +24,8 @@ from livebode_matrix import (
 )
 from livebode_matrix.change import tail
 from livebode_matrix.gantry_fit import parameters_of
-from livebode_matrix.mode_choice import chosen
-from livebode_matrix.row_scatter import row_scatter
-from livebode_matrix.whitening import Weighted
+from livebode_matrix.modes import chosen
+from livebode_matrix.whitening import WeightedMatrix, row_scatter
 from studies.matrix_change import EXCITATION, GANTRY, LINES, PERIODS, RATE_HZ, begun, matrices, true_modes
 
 RUNS = 12
@@ -92,11 +90,11 @@ def test_terms_that_noise_shared_by_the_entries_seems_to_show_are_removed(
     healthy: list[MatrixResponses], fitted: MatrixModes
 ) -> None:
     """One recording, and the machine's poles with an integrator."""
-    assert fitted.found is not None
-    of, one = fitted.found.structure, healthy[1]
+    assert fitted.best is not None
+    of, one = fitted.best.structure, healthy[1]
     outs = outputs_of([one[-1:].entry(o, i) for o in range(2) for i in range(2)], fitted.outputs, None, "zero-order")
-    begun = [solve(outs, replace(of, integrators=1), fitted.found.theta, rounds=2)]
-    found, *_ = chosen(Weighted.of(one, None), outs, begun, "rational", fixed=False)[0]
+    begun = [solve(outs, replace(of, integrators=1), fitted.best.theta, rounds=2)]
+    found, *_ = chosen(WeightedMatrix.of(one, None), outs, begun, "rational", fixed=False)[0]
     assert found.structure == of
 
 

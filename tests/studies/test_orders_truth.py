@@ -10,6 +10,8 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 from livebode.arrays import Complex
@@ -315,12 +317,36 @@ def test_a_file_is_replaced_only_with_force(example: Path, command: str, option:
     assert file.read_bytes() != b"mine"
 
 
+def test_orders_above_the_highest_frequency_are_not_known(example: Path) -> None:
+    """Order 24 is at 24 times the speed of the strokes, 0.8 … 1.7 turns/s."""
+    for options, known in (((), 24), (("--highest", 10), 6)):
+        found = json.loads(livebode("orders", example / "strokes.toml", *options, "--json").out)
+        motor = found["shafts"][0]["orders"]
+        assert max(one["order"] for one in motor if one["windows"]) >= known
+        assert [one["order"] for one in motor if one["seen"]] == [24] * (not options)
+
+
+def test_channels_and_rate_from_options_give_the_orders_of_the_configuration(example: Path) -> None:
+    options = ("--input", "u", "--velocity", "velocity", "--angle", "position", "--shaft", "motor=1:1,2,6,12,24,48")
+    found = livebode("orders", example / "strokes.parquet", *options, "--rate", 4000, "--time", "none", "--json")
+    described = json.loads(livebode("orders", example / "strokes.toml", "--json").out)
+    assert json.loads(found.out)["shafts"][0] == described["shafts"][0]
+
+
 def test_the_command_compares_with_a_baseline(example: Path) -> None:
     done = livebode("orders", example / "strokes.toml", "--baseline", example / "strokes.toml")
     assert done.code == 0, done.err
     assert "compared with strokes.toml: no order changed of 8; probability of a false alarm 0.1 %" in done.out
     found = livebode("orders", example / "strokes.toml", "--baseline", example / "strokes.toml", "--json")
     assert {one["changed"] for one in json.loads(found.out)["changes"]} == {False}
+    columns = pq.read_table(example / "strokes.parquet").to_pydict()
+    columns["position [rad]"] = [angle + 0.05 for angle in columns["position [rad]"]]
+    pq.write_table(pa.table(columns), example / "homed.parquet")
+    homed = (example / "strokes.toml").read_text("utf-8").replace("strokes.parquet", "homed.parquet")
+    (example / "homed.toml").write_text(homed, encoding="utf-8")
+    for options, changed in (((), {False, True}), (("--other-zero",), {False})):
+        compared = ("orders", example / "homed.toml", "--baseline", example / "strokes.toml", *options, "--json")
+        assert {one["changed"] for one in json.loads(livebode(*compared).out)["changes"]} == changed
     missing = livebode("orders", example / "strokes.toml", "--baseline", example / "none.toml")
     assert missing.code == 2
     assert "none.toml" in missing.err

@@ -16,17 +16,17 @@ from deltalake import DeltaTable
 from distributed import LocalCluster
 
 from livebode_plant.archive.archive_settings import ArchiveSettings
-from livebode_plant.archive.coordinator import Committer, Coordinator, Progress
-from livebode_plant.archive.job import Job
-from livebode_plant.archive.recording_places import (
+from livebode_plant.archive.archived_recordings import (
     ArchivedRecording,
+    HashedContent,
     RecordingPlace,
+    each_result,
     find_places,
     known_contents,
     untracked,
 )
-from livebode_plant.archive.results import HashedContent, each_result
-from livebode_plant.archive.tasks import handle
+from livebode_plant.archive.coordinator import Committer, Coordinator, Progress
+from livebode_plant.archive.tasks import Job, handle
 from livebode_plant.lake import TABLES, Lake
 
 _RATE_HZ, _WINDOW, _LINES = 4000, 400, np.array([20.0, 40.0, 60.0, 100.0])

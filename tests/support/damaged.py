@@ -60,7 +60,7 @@ def record_run(
 def make_runs(folder: Path) -> dict[str, Path]:
     """One in one piece with several row groups, one in segments, and one that was killed."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("livebode.records.table_file._GROUP_ROWS", 400)
+        patch.setattr("livebode.records.segments.segment_writer.GROUP_ROWS", 400)
         record_run(folder / "piece", segments=False)
     record_run(folder / "segments")
     with pytest.raises(StopError):

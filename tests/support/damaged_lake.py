@@ -17,8 +17,8 @@ import pyarrow as pa
 from deltalake import DeltaTable
 
 from livebode.core import ArchiveError, DamageWarning
-from livebode_plant.lake import TABLES, Key, Lake, StreamTable, compact
-from livebode_plant.lake.data_file import write_data_file
+from livebode_plant.lake import TABLES, DataFile, Key, Lake, StreamTable, compact
+from livebode_plant.lake.data_file import ResultFileWriter
 from livebode_plant.lake.query import query_lake
 from tests.support.file_damage import damage
 
@@ -122,3 +122,11 @@ def check_lake(
         rows = query_lake(Lake(str(other)), "SELECT * FROM quantities", 1000).rows
         assert len(rows) == sum(before["quantities"].rows.values()) - 1
     return "log" if file.startswith("_delta_log") else "data file", bool(after[table].sentence)
+
+
+def write_data_file(folder: Path, table: str, key: Key, parts: Iterable[pa.Table]) -> DataFile:
+    """Write the rows of one result, without the key's columns, to a file in this directory; none if it has no rows."""
+    with ResultFileWriter(folder, table, key) as writer:
+        for part in parts:
+            writer.write(part)
+        return writer.finish()

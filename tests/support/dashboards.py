@@ -14,7 +14,7 @@ import numpy as np
 from livebode.analysis import Overview
 from livebode.configuration import FitSection, LoopSection, RecordSection
 from livebode.core import Block, Channel, Lines, Responses
-from livebode.dashboard import Dashboard, Hub, Serving
+from livebode.dashboard import Dashboard, Hub, ServerSettings
 from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine
 from livebode.records import RunRecord
@@ -87,14 +87,14 @@ class Watched:
     def __init__(
         self,
         directory: Path,
-        serving: Serving | None = None,
+        serving: ServerSettings | None = None,
         loop: dict[str, Any] | None = LOOP,
         name: str = "axis",
         samples: bool = False,
     ) -> None:
         self.directory, self.machine = directory, Machine()
         self.messages: list[str] = []
-        self.dashboard = Dashboard(serving or Serving("127.0.0.1", 0), self.messages.append)
+        self.dashboard = Dashboard(serving or ServerSettings("127.0.0.1", 0), self.messages.append)
         self.hub = self.dashboard.hub(name)
         words = {"loop": loop or {}, "fit": FIT, "signals": {"output": "y", "input": "u", "schedule": "x"}}
         section = FitSection.model_validate(FIT)

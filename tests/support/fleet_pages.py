@@ -9,14 +9,11 @@ from contextlib import contextmanager
 
 import numpy as np
 
-from livebode.dashboard import Dashboard, Serving
+from livebode.dashboard import Dashboard, ServerSettings
 from livebode_plant.fleet.status_message import ACTIVE, BEHIND, NOT_READY, SILENT, STATES, encode_names, encode_status
-from livebode_plant.page.fleet_alarms import FleetAct
-from livebode_plant.page.fleet_board import LOOKS
-from livebode_plant.page.fleet_demo import DemoFleet
-from livebode_plant.page.fleet_feed import Hear
-from livebode_plant.page.fleet_pages import FleetSite
-from livebode_plant.page.fleet_view import FleetView
+from livebode_plant.page.fleet_board import LOOKS, FleetAct
+from livebode_plant.page.fleet_feed import DemoFleet, Hear
+from livebode_plant.page.fleet_pages import FleetView
 
 
 class DrivenFeed:
@@ -80,7 +77,7 @@ def fleet_page(
 ) -> Iterator[tuple[str, DrivenFeed]]:
     """Address and feed of a page that is served."""
     feed = DrivenFeed(DemoFleet(axes), after_s)
-    dashboard = Dashboard(Serving("127.0.0.1", 0))
-    dashboard.show(FleetSite(FleetView(feed, plan, lake=lake)))
+    dashboard = Dashboard(ServerSettings("127.0.0.1", 0))
+    dashboard.show(FleetView(feed, plan, lake=lake))
     with dashboard:
         yield dashboard.url, feed

@@ -14,12 +14,12 @@ import numpy as np
 from livebode.configuration import Axis
 from livebode.core import Channel
 from livebode.sources.live import Batch
-from livebode_plant.fleet.check import CheckResult, check_results
 from livebode_plant.fleet.fleet_settings import LogSection, machine_key
 from livebode_plant.fleet.log import ClaimLostError, FleetLog
 from livebode_plant.fleet.message import message_id, write_message
 from livebode_plant.fleet.partition import PartitionOwner
 from livebode_plant.fleet.reader import stored_messages
+from livebode_plant.fleet.replay import CheckResult, check_results
 from livebode_plant.fleet.result_message import ResultMessage
 from livebode_plant.fleet.status import status_of
 from livebode_plant.fleet.subjects import EDGE, LOG, LOG_STREAM, RESULT_STREAM, RESULTS

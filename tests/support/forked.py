@@ -24,7 +24,9 @@ from tests.support.command import no_pictures
 _IMPORTED = [
     "livebode.cli.app", "livebode.cli.run_command", "livebode.cli.serving", "livebode.pictures.bode",
     "livebode.pictures.tracking", "livebode.runtime._run", "livebode.runtime._demo", "livebode.sources.live.lines",
-    "matplotlib.backends.backend_agg", "matplotlib.figure", "pyarrow.parquet", "scipy.optimize", "scipy.signal",
+    "livebode_plant.fleet.sink", "livebode_plant.fleet.worker",
+    "matplotlib.backends.backend_agg", "matplotlib.figure", "nats.aio.client", "pyarrow.parquet", "scipy.optimize",
+    "scipy.signal",
     "tests.support.forked", "tests.support.killed", "tests.support.killed_live",
 ]  # fmt: skip
 
@@ -68,6 +70,10 @@ class Command:
         self._folder.cleanup()
 
     @property
+    def pid(self) -> int:
+        return self._process.pid or 0
+
+    @property
     def returncode(self) -> int | None:
         return self._process.exitcode
 
@@ -96,7 +102,7 @@ class Command:
 
     def send_signal(self, number: int) -> None:
         if self.poll() is None:
-            os.kill(self._process.pid or 0, number)
+            os.kill(self.pid, number)
 
     def kill(self) -> None:
         self.send_signal(signal.SIGKILL)

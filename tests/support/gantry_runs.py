@@ -9,7 +9,7 @@ import numpy as np
 
 from livebode.configuration import Axis
 from livebode.core import Block, Lines
-from livebode.mimo import MatrixExcitation
+from livebode.excitation import MatrixExcitation
 from livebode.runtime import Destination, Outcome, run
 from livebode.simulation import GantryLoop
 from tests.support.command import write_parquet

@@ -13,7 +13,7 @@ from typing import Any
 import websockets
 from websockets.sync.client import ClientConnection
 
-from livebode.dashboard import Serving
+from livebode.dashboard import ServerSettings
 from tests.support.dashboards import Watched
 from tests.support.peers.peer import PATIENCE_S
 
@@ -23,7 +23,7 @@ TOKEN, VIEWER = "operator-" + "x" * 40, "viewer-" + "y" * 40
 @contextlib.contextmanager
 def guarded(folder: Path) -> Iterator[Watched]:
     """With tokens, on the loopback."""
-    serving = Serving("127.0.0.1", 0, token=TOKEN, viewer_token=VIEWER)
+    serving = ServerSettings("127.0.0.1", 0, token=TOKEN, viewer_token=VIEWER)
     with Watched(folder / "run", serving) as found:
         found.go(6000)
         yield found

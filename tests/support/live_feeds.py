@@ -24,8 +24,8 @@ from pyarrow import parquet
 
 from livebode.records import RunRecord
 from livebode.sources.live import Batch, encode_layout, encode_line, encode_samples
+from livebode_drives.live.ads import HEADER, MAGIC, VERSION
 from livebode_drives.live.klipper import WAIT_S
-from livebode_drives.live.ring import HEADER, MAGIC, VERSION
 from tests.support.command import RATE_HZ
 from tests.support.peers.broker import TOPIC, Mosquitto, publisher, stop
 from tests.support.peers.can_bus import COUNTED

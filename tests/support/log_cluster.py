@@ -11,7 +11,7 @@ from pathlib import Path
 from livebode_plant.fleet.fleet_settings import LogSection, ServerSection
 from livebode_plant.fleet.log import FleetLog
 from livebode_plant.fleet.server import LogServer, free_port
-from livebode_plant.fleet.server_cluster import ClusterMember
+from livebode_plant.fleet.server_config import ClusterMember
 from livebode_plant.fleet.subjects import LOG_STREAM
 from tests.support.fleet_runs import PARTITIONS
 from tests.support.peers.peer import PATIENCE_S

@@ -11,11 +11,12 @@ import numpy as np
 from livebode.configuration import Axis, RecordSection
 from livebode.estimation import Follower
 from livebode.records import RUN, RunRecord
+from livebode.records.segments.manifest import NAME as MANIFEST
 from livebode.records.summary_file import to_document
 from livebode.runtime import ChangeDetection, Destination, Feed, Fits, Outcome, RunLoop, SingleResponse, Subscriber, run
 from livebode.runtime.feed import Source
 from tests.support.command import write_parquet
-from tools.parquet_parts import parts_of
+from tools.parquet_parts import manifest_of
 
 
 def small_run(folder: Path, columns: Mapping[str, np.ndarray], **sections: dict[str, object]) -> Path:
@@ -28,9 +29,9 @@ def small_run(folder: Path, columns: Mapping[str, np.ndarray], **sections: dict[
 
 
 def describe(folder: Path, like: Path) -> None:
-    """Write the run.json of a run for the tables in a directory."""
-    files = {path.name: parts_of(path) for path in sorted(folder.glob("*.parquet"))}
-    (folder / RUN).write_bytes(to_document(RunRecord.open(like).summary | {"files": files}))
+    """Write run.json and manifest of a run for the tables in a directory."""
+    (folder / MANIFEST).write_bytes(listed := manifest_of(folder))
+    (folder / RUN).write_bytes(to_document(RunRecord.open(like).summary | {"size_bytes": {MANIFEST: len(listed)}}))
 
 
 def record(

@@ -12,11 +12,11 @@ from typing import Literal
 import trustme
 
 from livebode.configuration import Axis
-from livebode_plant.fleet.credentials import write_credentials
+from livebode_plant.fleet.connection import write_credentials
 from livebode_plant.fleet.fleet_settings import LogSection, ServerSection, UsersSection
 from livebode_plant.fleet.log import FleetLog
 from livebode_plant.fleet.server import LogServer, free_port
-from livebode_plant.fleet.server_access import ServerAccess
+from livebode_plant.fleet.server_config import ServerAccess
 from livebode_plant.fleet.subjects import axis_path
 from tests.support.fleet_runs import PARTITIONS, fleet_axes
 

@@ -21,9 +21,8 @@ from livebode.estimation import (
     Tracker,
     UnevenTracker,
 )
-from livebode.excitation import multisine
+from livebode.excitation import MatrixExcitation, multisine
 from livebode.fitting import DriftTest, EvaluationGrid, Fitter, TwoMass
-from livebode.mimo import MatrixExcitation
 from livebode.monitoring import (
     Baseline,
     Monitor,
@@ -43,8 +42,8 @@ from livebode.simulation import BeltAxis, Sensor, SimulatedAxis, Strokes, Tensio
 from livebode.sources.live import Batch, LiveBlock, Origin, Sequencer, SourceEvents
 from livebode.sources.live.kernel_drive import KernelDrive
 from livebode_matrix import MatrixMonitor, MatrixSettings, MatrixTracker, example_matrix_responses
-from livebode_matrix.columns import MatrixColumns
 from livebode_matrix.detection import MatrixDetection
+from livebode_matrix.response_matrix import MatrixColumns
 from livebode_plant.fleet.axis_stream import AxisStream
 from livebode_plant.fleet.message import write_message
 from tests.support.axes import LINES as AXIS_LINES
@@ -192,7 +191,7 @@ def matrix_columns() -> Case:
     inputs, lines = matrices.inputs, len(matrices.lines)
 
     def step(stage: MatrixColumns, part: MatrixResponses) -> object:
-        stage.take(part)
+        stage.add(part)
         return stage.summary(matrices.frequency_hz), stage.valid
 
     return Case(

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from livebode.core import Block, Event, Lines, MatrixResponses
-from livebode.mimo import MatrixExcitation
+from livebode.excitation import MatrixExcitation
 from livebode.records import MATRIX_TABLES, RunDirectory
 from livebode_matrix import MatrixSettings, MatrixTracker
 from tests.support.stored import digest

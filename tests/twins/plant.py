@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from scipy.integrate import DOP853
 
-from livebode.simulation.controller import Now, Settings
+from livebode.simulation.fmu import Now, Settings
 
 
 def friction(coulomb: float, stribeck: float, s: Settings, speed: float) -> float:

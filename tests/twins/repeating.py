@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.estimation.hum import GONE, GONE_PERIODS, PERIODS, PERIODS_FIRST, STEADY
-from livebode.estimation.moments import Moments, divided, magnitude, power, scaled, times, weights_of
+from livebode.estimation.periods import Moments, weights_of
+from livebode.estimation.products import divided, magnitude, power, scaled, times
 from livebode.estimation.verdicts import HUM, KINDS, Judge
 from livebode.kernel import (
     ADDED,

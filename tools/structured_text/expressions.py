@@ -11,7 +11,7 @@ from tools.structured_text import types
 from tools.structured_text.types import ANY_INT, BOOL, LREAL, SCALARS, Array, Kind, Named, RefusedError, Scalar
 
 COMPARED = {"<": "<", ">": ">", "<=": "<=", ">=": ">=", "=": "==", "<>": "!="}
-RUNTIME = {name: getattr(types, name) for name in ("at", "at2", "quotient", "remainder", "divided", "to_lreal")}
+RUNTIME = {name: getattr(types, name) for name in ("at", "quotient", "remainder", "divided", "to_lreal")}
 RUNTIME |= {f"fit_{name}": kind.fit for name, kind in SCALARS.items() if kind.integer}
 RUNTIME |= {f"type_{name}": kind for name, kind in SCALARS.items() if kind.integer}
 
@@ -83,8 +83,10 @@ class Scope:
             index = self.expression(subscript)
             if not isinstance(index.kind, Scalar) or not index.kind.integer:
                 raise RefusedError(f"a subscript of {of.text} is no integer")
-            parts.append(f"{index.text}, {length}")
-        return Typed(f"{of.text}[{'at' if len(parts) == 1 else 'at2'}({', '.join(parts)})]", of.kind.of)
+            parts.append(subscripted(index, length))
+        # The last index runs fastest.
+        place = parts[0] if len(parts) == 1 else f"({parts[0]}) * {of.kind.lengths[1]} + ({parts[1]})"
+        return Typed(f"{of.text}[{place}]", of.kind.of)
 
     def _integer(self, node: tf.Integer, base: int = 10) -> Typed:
         value = int(str(node.value), base)
@@ -148,6 +150,15 @@ class Scope:
             if target in SCALARS and SCALARS[target].integer and SCALARS[source].integer:
                 return Typed(f"fit_{target}({given[0].text})", SCALARS[target], operations)
         raise RefusedError(f"{name}({', '.join(str(g.kind) for g in given)}) is not in the subset")
+
+
+def subscripted(index: Typed, length: int) -> str:
+    """Text of a subscript that is held to its bounds; a call costs several times the comparison of a plain variable."""
+    if index.literal is not None and 0 <= index.literal < length:
+        return index.text
+    checked = f"at({index.text}, {length})"
+    plain = re.fullmatch(r"v_\w+", index.text)
+    return f"{index.text} if 0 <= {index.text} < {length} else {checked}" if plain else checked
 
 
 def common(left: Typed, right: Typed, sign: str) -> Scalar:

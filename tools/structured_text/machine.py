@@ -5,7 +5,7 @@ from __future__ import annotations
 import gc
 import pickle
 from collections.abc import Callable
-from functools import cache
+from functools import cache, cached_property
 from importlib.metadata import version
 from types import SimpleNamespace
 from typing import Any
@@ -14,7 +14,7 @@ import numpy as np
 from blark import transform as tf
 from blark.parse import parse_source_code
 
-from livebode.structured_text.names import KEYWORDS
+from livebode.structured_text import KEYWORDS
 from tools.stored import stored
 from tools.structured_text.expressions import RUNTIME, Scope, assignable
 from tools.structured_text.statements import Body
@@ -78,7 +78,7 @@ class Unit:
                 self.kinds[name], self.initial[name] = _kind(item.init)
                 self.places[name] = place
 
-    @property
+    @cached_property
     def inputs(self) -> dict[str, tuple[Kind, bool]]:
         """Type of each, and whether every call must give it."""
         return {n: (self.kinds[n], p == "in_out") for n, p in self.places.items() if p in ("input", "in_out")}

@@ -78,10 +78,6 @@ def at(index: int, length: int) -> int:
     return index
 
 
-def at2(first: int, rows: int, second: int, columns: int) -> int:
-    return at(first, rows) * columns + at(second, columns)
-
-
 def quotient(kind: Scalar, a: int, b: int) -> int:
     """Cut off towards zero."""
     if b == 0:

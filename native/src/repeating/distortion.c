@@ -1,7 +1,7 @@
 /* Variance that distortion adds at the lines, from the detection lines: what repeats there beyond the noise. */
 #include "repeating.h"
 
-/* A line's coherent part of a distortion over that at a detection line, as a power; livebode.estimation.distortion
+/* A line's coherent part of a distortion over that at a detection line, as a power; livebode.estimation.verdicts
  * says why. */
 static const double coherent_power = 9.0;
 /* Ratio to uniform rounding that the steps of a sensor may have at a few bins. */

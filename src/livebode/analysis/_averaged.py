@@ -76,7 +76,7 @@ class Overview:
 
 
 @dataclass(frozen=True, eq=False)
-class Averaged:
+class RunMean:
     """The average response of a run, and a description of what was averaged.
 
     Attributes
@@ -111,7 +111,7 @@ class Averaged:
     moved: bool
 
 
-def averaged(run: RunRecord) -> Averaged:
+def averaged(run: RunRecord) -> RunMean:
     """Read the run.
 
     Raises
@@ -124,14 +124,14 @@ def averaged(run: RunRecord) -> Averaged:
         mean.add(part)
         overview.add(part)
         counted.add(part)
-    one, words = mean.response()[0], Message("the mean of {responses} responses", responses=mean.rows)
+    response, words = mean.response()[0], Message("the mean of {responses} responses", responses=mean.rows)
     if isinstance(mean, fitting.RecordingsMean):
         words = Message("{mean} in {recordings} recordings", mean=words, recordings=len(run.found["recordings"]))
     if mean.averages:
-        end_s = counted.begin_s + (one.sample + 1) / run.lines.rate_hz
+        end_s = counted.begin_s + (response.sample + 1) / run.lines.rate_hz
         words = Message("the average up to {end_s:.6g} s", end_s=end_s)
-    found = Averaged(
-        one,
+    result = RunMean(
+        response,
         run.kinds,
         words,
         overview.responses(),
@@ -142,15 +142,15 @@ def averaged(run: RunRecord) -> Averaged:
         counted.spans,
         counted.moved,
     )
-    if not found.moved:
-        return found
+    if not result.moved:
+        return result
     words = Message(
         "{mean} from {low:.4g} to {high:.4g} of the schedule, whose change is in the bounds",
         mean=words,
-        low=found.spans[0],
-        high=found.spans[1],
+        low=result.spans[0],
+        high=result.spans[1],
     )
-    return Averaged(**{**found.__dict__, "words": words})
+    return RunMean(**{**result.__dict__, "words": words})
 
 
 def running_mean(run: RunRecord) -> fitting.RunningMean | fitting.RecordingsMean:
@@ -211,8 +211,8 @@ class _RunProperties:
         place = ((sample + 1) % self._window // self._hop - 1) % places
         follows = (np.diff(place) % places == 1 % places) & (np.diff(sample) <= 2 * self._hop)
         cuts = np.flatnonzero(~follows) + 1
-        for at, values in zip(np.split(place, cuts), np.split(schedule, cuts)):
-            self.moved |= bool(self._movement.process(int(at[0]), values).any())
+        for samples, values in zip(np.split(place, cuts), np.split(schedule, cuts)):
+            self.moved |= bool(self._movement.process(int(samples[0]), values).any())
 
 
 def _wider(span: tuple[float, float], values: np.ndarray) -> tuple[float, float]:

@@ -3,16 +3,57 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Any
 
+from pydantic import ValidationError
+
 from livebode.analysis._margins import CONTRADICTED, Margins, against_lines, peak_sensitivity_at_lines, worst
-from livebode.analysis.loop_verdict import NOT_CHECKED, CheckedLoop
+from livebode.analysis.fits import by_place
 from livebode.analysis.margin_reading import margins
 from livebode.analysis.open_loop import OpenLoop
-from livebode.analysis.place_fits import by_place
+from livebode.configuration import LoopSection, without_null
 from livebode.core import FitError, Loop, Parameters, Responses
 from livebode.fitting import Fit, Fitter, mean_response
 from livebode.language import Message
+from livebode.records import read_loop_check
+
+
+@dataclass(frozen=True)
+class CheckedLoop:
+    """Whether the description of a loop was checked, in short.
+
+    Attributes
+    ----------
+    verdict
+        "as described", "one change", "not explained", or "not checked".
+    sentence
+        The result, or why there is none.
+    """
+
+    verdict: str
+    sentence: str
+
+
+NOT_CHECKED = CheckedLoop("not checked", "loop not checked: its description was not compared with the signals")
+CHANGED = CheckedLoop("not checked", "loop not checked: another description was compared with the signals")
+
+
+def checked_loop(directory: Path, section: LoopSection, entry: tuple[str, str] | None = None) -> CheckedLoop:
+    """What is known of this description of a run's loop: the newest check, if it was of the same description.
+
+    With the output and the input of an `entry` of a matrix run, `section` describes its controller alone.
+    """
+    stored = read_loop_check(directory)
+    if stored is None:
+        return NOT_CHECKED
+    try:
+        of = LoopSection.model_validate(without_null(stored["loop"]))
+        if entry is not None:
+            of, stored = of.of_controller(*entry), stored["controllers"]["/".join(entry)]
+    except (ValidationError, AttributeError, KeyError, TypeError):
+        return CHANGED
+    return CheckedLoop(str(stored.get("verdict")), str(stored["sentence"])) if of == section else CHANGED
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +111,7 @@ class LoopReport:
     def plain(self, tuning: dict[str, Any] | None) -> dict[str, Any]:
         """For JSON, with the proposed filter, if one was looked for."""
         bound = self.margins.bound()[0]
-        found = {
+        margins = {
             name: {
                 "value": float(self.margins.value[0, i]),
                 "bound_95": float(bound[i]),
@@ -86,7 +127,7 @@ class LoopReport:
             "model": self.fit.model.name,
             "status": str(self.margins.status[0]),
             "message": self.message,
-            "margins": found,
+            "margins": margins,
             "peak_sensitivity_at_lines": {"at_least": size, "bound": around, "frequency_hz": at_hz},
             "places": len(self.places),
             "worst_over_places": worst(self.places),

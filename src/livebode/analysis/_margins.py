@@ -111,9 +111,9 @@ class Margins(RowArrays):
         value = np.stack([self.value, self.frequency_hz], axis=2)
         spread = np.stack([self.sigma, self.frequency_sigma_hz], axis=2)
         covariance = (spread**2)[..., np.newaxis] * np.eye(2)
-        found = []
+        tables = []
         for i, (name, unit) in enumerate(zip(MARGIN_NAMES, UNITS)):
-            found.append(
+            tables.append(
                 Parameters(
                     model="margins",
                     names=(name, f"{name}_frequency"),
@@ -129,12 +129,12 @@ class Margins(RowArrays):
                     schedule=self.schedule,
                 )
             )
-        return tuple(found)
+        return tuple(tables)
 
 
-def worst(found: Margins) -> dict[str, float]:
+def worst(margins: Margins) -> dict[str, float]:
     """The least of each margin over the valid rows (of Ms the largest)."""
-    rows = found.value[found.ok]
+    rows = margins.value[margins.ok]
     if not len(rows):
         return {}
     least = {name: float(np.min(rows[:, i])) for i, name in enumerate(MARGIN_NAMES)}
@@ -144,8 +144,8 @@ def worst(found: Margins) -> dict[str, float]:
     return least
 
 
-def against_lines(found: Margins, responses: Responses, loop: Loop) -> Margins:
-    """The same margins, without numbers where the lines show a larger Ms than the fit allows.
+def against_lines(margins: Margins, responses: Responses, loop: Loop) -> Margins:
+    """Margins without numbers where the lines show a larger Ms than the fit allows.
 
     A row is contradicted where |S| = 1/|1 + F·G| at a line, less its bound, is above Ms plus its bound: the model omits
     what brings the loop nearer to −1, so all its margins are invalid. The lines' bound covers all lines of a row
@@ -164,23 +164,23 @@ def against_lines(found: Margins, responses: Responses, loop: Loop) -> Margins:
     -------
     With the status "contradicted by the lines" and NaN in such rows.
     """
-    if not len(found):
-        return found
+    if not len(margins):
+        return margins
     behind = loop.feedback_at(responses.lines.frequency_hz)
     c = float(np.sqrt(np.log(len(responses.lines) / _CHANCE)))
     with np.errstate(invalid="ignore", divide="ignore"):  # of invalid lines
         sensitivity = 1 / (1 + responses.value * behind)
         least = np.abs(sensitivity) - responses.bound(c) * np.abs(behind * sensitivity**2)
         shown = np.where(responses.valid & np.isfinite(least), least, -np.inf).max(axis=1)
-        most = (found.value + found.bound())[:, MARGIN_NAMES.index("peak_sensitivity")]
-        wrong = found.ok & (shown > most)
+        most = (margins.value + margins.bound())[:, MARGIN_NAMES.index("peak_sensitivity")]
+        wrong = margins.ok & (shown > most)
     if not wrong.any():
-        return found
-    status = found.status.astype(f"<U{max(len(CONTRADICTED), found.status.dtype.itemsize // 4)}")
+        return margins
+    status = margins.status.astype(f"<U{max(len(CONTRADICTED), margins.status.dtype.itemsize // 4)}")
     status[wrong] = CONTRADICTED
     numbers = ("value", "sigma", "frequency_hz", "frequency_sigma_hz")
-    kept = {name: np.where(wrong[:, np.newaxis], np.nan, getattr(found, name)) for name in numbers}
-    return replace(found, **kept, status=status, place=np.where(wrong[:, np.newaxis], NONE, found.place))
+    kept = {name: np.where(wrong[:, np.newaxis], np.nan, getattr(margins, name)) for name in numbers}
+    return replace(margins, **kept, status=status, place=np.where(wrong[:, np.newaxis], NONE, margins.place))
 
 
 def peak_sensitivity_at_lines(responses: Responses, loop: Loop, c: float = 2.0) -> tuple[Floats, Floats, Floats]:
@@ -217,8 +217,8 @@ def peak_sensitivity_at_lines(responses: Responses, loop: Loop, c: float = 2.0) 
     with np.errstate(invalid="ignore", divide="ignore"):  # of invalid lines
         sensitivity = 1 / (1 + responses.value * behind)
     size = np.where(responses.valid, np.abs(sensitivity), -np.inf)
-    at = np.argmax(size, axis=1)
+    largest = np.argmax(size, axis=1)
     row = np.arange(len(size))
-    known = np.isfinite(size[row, at])
+    known = np.isfinite(size[row, largest])
     bound = responses.bound(c) * np.abs(behind * sensitivity**2)
-    return tuple(np.where(known, x, np.nan) for x in (size[row, at], bound[row, at], f[at]))  # type: ignore[return-value]
+    return tuple(np.where(known, x, np.nan) for x in (size[row, largest], bound[row, largest], f[largest]))  # type: ignore[return-value]

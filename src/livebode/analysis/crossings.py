@@ -60,28 +60,28 @@ def crossings(
     first = np.argmax(below, axis=1)
     row = np.flatnonzero((first > 0) & below[np.arange(len(grid)), first])
     starts = [at_gain, at_phase, (row, first[row] - 1)]
-    found = _roots(loop, values, frequency_hz, starts)
+    roots = _roots(loop, values, frequency_hz, starts)
     last = np.flatnonzero(grid[:, -1].real < 0)
     ends = Crossings(last, np.full(last.size, frequency_hz[-1]), grid[last, -1])
-    phase = Crossings(*(np.concatenate(parts) for parts in zip(found[1], ends)))
-    return found[0], phase, found[2]
+    phase = Crossings(*(np.concatenate(parts) for parts in zip(roots[1], ends)))
+    return roots[0], phase, roots[2]
 
 
 def nearest_to_minus_one(loop: OpenLoop, values: Floats, frequency_hz: Floats, grid: Complex) -> Crossings:
     """Where |1 + L| is least in each row."""
     row = np.arange(len(grid))
-    at = np.argmin(np.abs(1 + grid), axis=1)
-    found = Crossings(row, frequency_hz[at], grid[row, at])
-    inside = np.flatnonzero((at > 0) & (at < len(frequency_hz) - 1))
+    index = np.argmin(np.abs(1 + grid), axis=1)
+    nearest = Crossings(row, frequency_hz[index], grid[row, index])
+    inside = np.flatnonzero((index > 0) & (index < len(frequency_hz) - 1))
     if not inside.size:
-        return found
+        return nearest
     log = np.log(frequency_hz)
 
     def distance(x: Floats) -> Floats:
         return np.abs(1 + _one(loop, values, np.exp(x), inside))
 
-    frequency = found.frequency_hz.copy()
-    frequency[inside] = np.exp(find_minima(distance, log[at[inside] - 1], log[at[inside] + 1], _WIDTH))
+    frequency = nearest.frequency_hz.copy()
+    frequency[inside] = np.exp(find_minima(distance, log[index[inside] - 1], log[index[inside] + 1], _WIDTH))
     return Crossings(row, frequency, _one(loop, values, frequency, row))
 
 
@@ -94,25 +94,25 @@ def _changes(grid: Complex, kind: CrossingKind) -> Starts:
     At half the rate L is real except for rounding, so the sign there is meaningless.
     """
     sign = kind.side(grid) > 0
-    row, at = np.nonzero(sign[:, 1:] != sign[:, :-1])
-    kept = kind.counts(grid[row, at])
+    row, point = np.nonzero(sign[:, 1:] != sign[:, :-1])
+    kept = kind.counts(grid[row, point])
     if kind is PHASE:
-        kept &= at < grid.shape[1] - 2
-    return row[kept], at[kept]
+        kept &= point < grid.shape[1] - 2
+    return row[kept], point[kept]
 
 
 def _roots(loop: OpenLoop, values: Floats, frequency_hz: Floats, starts: list[Starts]) -> list[Crossings]:
     """The roots between neighbours of the grid; all kinds at once, because the number of calls determines the time."""
-    row, at = (np.concatenate(part) for part in zip(*starts))
+    row, point = (np.concatenate(part) for part in zip(*starts))
     kind = np.repeat(np.arange(len(starts)), [len(r) for r, _ in starts])
     if not row.size:
         return [Crossings(row, np.zeros(0), np.zeros(0, dtype=np.complex128))] * len(starts)
 
     def value(x: Floats) -> Floats:
-        found = _one(loop, values, x, row)
-        return np.asarray(np.choose(kind, [k.side(found) for k in _KINDS]))
+        open_loop = _one(loop, values, x, row)
+        return np.asarray(np.choose(kind, [k.side(open_loop) for k in _KINDS]))
 
-    root = find_roots(value, frequency_hz[at], frequency_hz[at + 1], _TOLERANCE)
+    root = find_roots(value, frequency_hz[point], frequency_hz[point + 1], _TOLERANCE)
     level = _one(loop, values, root, row)
     return [Crossings(row[of], root[of], level[of]) for of in (kind == i for i in range(len(starts)))]
 
@@ -141,23 +141,23 @@ def find_roots(function: Function, low: Floats, high: Floats, tolerance: float) 
     array([1.41421356, 3.        ])
     """
     at_low, at_high = function(low), function(high)
-    found = high
+    root = high
     with np.errstate(all="ignore"):
         for _ in range(_STEPS_MAX):
             middle = (low + high) / 2
             level = function(middle)
             step = (middle - low) * np.sign(at_low - at_high) * level / np.sqrt(level**2 - at_low * at_high)
-            last, found = found, middle + np.where(np.isfinite(step), step, 0.0)
-            value = function(found)
-            for x, y in ((middle, level), (found, value)):
+            last, root = root, middle + np.where(np.isfinite(step), step, 0.0)
+            value = function(root)
+            for x, y in ((middle, level), (root, value)):
                 inside = (x > low) & (x < high)
                 below = inside & ((y > 0) == (at_low > 0))
                 above = inside & ~below
                 low, at_low = np.where(below, x, low), np.where(below, y, at_low)
                 high, at_high = np.where(above, x, high), np.where(above, y, at_high)
-            if ((np.abs(found - last) <= tolerance * np.abs(found)) | (value == 0)).all():
+            if ((np.abs(root - last) <= tolerance * np.abs(root)) | (value == 0)).all():
                 break
-    return found
+    return root
 
 
 def find_minima(function: Function, low: Floats, high: Floats, width: float) -> Floats:
@@ -180,7 +180,7 @@ def find_minima(function: Function, low: Floats, high: Floats, width: float) -> 
         left, right = np.where(lower, new, right), np.where(lower, left, new)
         at_left, at_right = np.where(lower, value, at_right), np.where(lower, at_left, value)
     middle, quarter = (low + high) / 2, (high - low) / 4
-    before, at, after = (function(x) for x in (low, middle, high))
-    bend = before - 2 * at + after
+    before, between, after = (function(x) for x in (low, middle, high))
+    bend = before - 2 * between + after
     share = np.divide(before - after, bend, out=np.zeros_like(bend), where=bend > 0).clip(-2, 2)
     return np.asarray(middle + quarter * share)

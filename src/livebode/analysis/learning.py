@@ -75,7 +75,7 @@ class HealthyRun(Protocol):
 
     @property
     def is_matrix(self) -> bool:
-        """Whether it has matrices of responses."""
+        """Whether the run has matrices of responses."""
 
     @property
     def place(self) -> str:
@@ -223,7 +223,7 @@ def _check_once(runs: list[RunRecord], axes: list[Axis]) -> None:
 
 
 def _check_same(first: HealthyRun, mine: Axis, run: HealthyRun, axis: Axis) -> None:
-    for name, one, other in (
+    for name, expected, other in (
         ("lines", True, first.lines.alike(run.lines) and first.lines.quiet == run.lines.quiet),
         ("hop", first.found["hop"], run.found["hop"]),
         ("signals", mine.signals, axis.signals),
@@ -233,7 +233,7 @@ def _check_same(first: HealthyRun, mine: Axis, run: HealthyRun, axis: Axis) -> N
         ("covariates", mine.monitoring.covariates, axis.monitoring.covariates),
         ("the unit of the response", first.found.get("unit", ""), run.found.get("unit", "")),
     ):
-        if one != other:
+        if expected != other:
             raise BaselineError(
                 "runs-differ",
                 f"{run.place!r} and {first.place!r} differ in {name}",
@@ -337,7 +337,7 @@ def _torque(
 
 
 def _shafts(axis: Axis, kinds: PlantKinds) -> list[Shaft]:
-    """Those of [orders]; without that section, the motor if its angle is in radians, turns or degrees."""
+    """Shafts of [orders]; without that section, the motor if its angle is in radians, turns or degrees."""
     section = axis.orders
     return section.all_shafts() if section != OrdersSection() or kinds.input == "torque" else []
 

@@ -17,8 +17,8 @@ from livebode.kernel import MarginGrid, fit_margins
 
 _DB = 20 / np.log(10)
 _ROWS = 64  # evaluated at once: some 2 MB a grid
-_STEP = 1e-5
-_PEAK_STEP = 1e-3
+_STEP = 1e-5  # of a frequency: central differences of ln L have an error of 1e-10
+_PEAK_STEP = 1e-3  # differences of slopes, which are themselves differences, need a larger step
 _OF_SIGMA, _OF_VALUE = 1e-3, 1e-7  # step of a parameter
 
 
@@ -33,7 +33,7 @@ class FittedValues(NamedTuple):
 
 
 class Slopes(NamedTuple):
-    """Of ln L at places: by ln f, shape (places,), and by each parameter in its sigmas, (places, parameters)."""
+    """Slopes of ln L at places: by ln f, shape (places,), and by each parameter in its sigmas, (places, parameters)."""
 
     by_frequency: Complex
     by_parameter: Complex
@@ -87,27 +87,29 @@ def margins(fits: Parameters, loop: OpenLoop, band_hz: tuple[float, float]) -> M
             value=[float(low), float(high)],
             rate_hz=loop.rate_hz,
         )
-    found = _nothing(fits)
+    result = _nothing(fits)
     rows = np.flatnonzero(fits.ok)
     for alike, grid in loop.grids(fits.value[rows], band_hz) if rows.size else ():
         if loop.native is not None:
-            _read_natively(found, rows[alike], fits, loop, grid)
+            _read_natively(result, rows[alike], fits, loop, grid)
             continue
         for part in _parts(rows[alike]):
-            _read(found, part, fits.value[part], fits.covariance[part], loop, grid)
-    place = np.where((found.frequency_hz >= low) & (found.frequency_hz <= high), INTERPOLATED, EXTRAPOLATED)
-    found.place[:] = np.where(np.isnan(found.frequency_hz), NONE, place)
-    return found
+            _read(result, part, fits.value[part], fits.covariance[part], loop, grid)
+    place = np.where((result.frequency_hz >= low) & (result.frequency_hz <= high), INTERPOLATED, EXTRAPOLATED)
+    result.place[:] = np.where(np.isnan(result.frequency_hz), NONE, place)
+    return result
 
 
-def _read_natively(found: Margins, rows: NDArray[np.int64], fits: Parameters, loop: OpenLoop, grid: MarginGrid) -> None:
-    """As `_read`, row by row in C; equal to rounding."""
+def _read_natively(
+    result: Margins, rows: NDArray[np.int64], fits: Parameters, loop: OpenLoop, grid: MarginGrid
+) -> None:
+    """Write the margins as `_read` does, row by row in C; equal to rounding."""
     assert loop.native is not None  # the caller has examined it
     model, series = loop.native
     of = fit_margins(model, series, grid, fits.value[rows], fits.covariance[rows])
-    found.status[rows[~of.stable]] = UNSTABLE
-    found.value[rows], found.sigma[rows] = of.value, of.sigma
-    found.frequency_hz[rows], found.frequency_sigma_hz[rows] = of.frequency_hz, of.frequency_sigma_hz
+    result.status[rows[~of.stable]] = UNSTABLE
+    result.value[rows], result.sigma[rows] = of.value, of.sigma
+    result.frequency_hz[rows], result.frequency_sigma_hz[rows] = of.frequency_hz, of.frequency_sigma_hz
 
 
 def _parts(rows: NDArray[np.int64]) -> Iterator[NDArray[np.int64]]:
@@ -131,7 +133,7 @@ def _nothing(fits: Parameters) -> Margins:
 
 
 def _read(
-    found: Margins,
+    result: Margins,
     rows: NDArray[np.int64],
     values: Floats,
     covariance: Floats,
@@ -142,7 +144,7 @@ def _read(
     f = points.frequency_hz
     grid = loop.at(values, f)
     steady = stable(grid, f, loop.unstable_poles(values))
-    found.status[rows[~steady]] = UNSTABLE
+    result.status[rows[~steady]] = UNSTABLE
     if not steady.any():
         return
     rows, values, covariance, grid = rows[steady], values[steady], covariance[steady], grid[steady]
@@ -164,24 +166,24 @@ def _read(
     correlation = covariance / unit[:, :, np.newaxis] / unit[:, np.newaxis]
     fits = FittedValues(values, sigma)
     everywhere = slopes(loop, fits, Crossings(*(np.concatenate(parts) for parts in zip(*chosen))))
-    ends = np.cumsum([0, *(len(at.row) for at in chosen)])
-    for column, at in enumerate(chosen):
-        reading = _READING[column](loop, fits, at, everywhere.part(slice(ends[column], ends[column + 1])))
-        _write(found, rows, column, at, reading, correlation)
+    ends = np.cumsum([0, *(len(crossing.row) for crossing in chosen)])
+    for column, crossing in enumerate(chosen):
+        reading = _READING[column](loop, fits, crossing, everywhere.part(slice(ends[column], ends[column + 1])))
+        _write(result, rows, column, crossing, reading, correlation)
 
 
 def _write(
-    found: Margins, rows: NDArray[np.int64], column: int, at: Crossings, reading: Reading, correlation: Floats
+    result: Margins, rows: NDArray[np.int64], column: int, crossing: Crossings, reading: Reading, correlation: Floats
 ) -> None:
     value, by, by_log_f = reading
-    found.value[rows, column], found.sigma[rows, column] = np.inf, 0.0
+    result.value[rows, column], result.sigma[rows, column] = np.inf, 0.0
     if column == MARGIN_NAMES.index("bandwidth"):
-        found.value[rows, column], found.sigma[rows, column] = np.nan, np.nan
-    to = rows[at.row]
-    found.value[to, column] = value
-    found.frequency_hz[to, column] = at.frequency_hz
-    found.sigma[to, column] = _spread(by, correlation[at.row])
-    found.frequency_sigma_hz[to, column] = at.frequency_hz * _spread(by_log_f, correlation[at.row])
+        result.value[rows, column], result.sigma[rows, column] = np.nan, np.nan
+    to = rows[crossing.row]
+    result.value[to, column] = value
+    result.frequency_hz[to, column] = crossing.frequency_hz
+    result.sigma[to, column] = _spread(by, correlation[crossing.row])
+    result.frequency_sigma_hz[to, column] = crossing.frequency_hz * _spread(by_log_f, correlation[crossing.row])
 
 
 def _spread(by: Floats, correlation: Floats) -> Floats:
@@ -201,57 +203,57 @@ def _nearest(places: Crossings, cost: Floats, counts: NDArray[np.bool_] | None =
 Reading = tuple[Floats, Floats, Floats]
 
 
-def _gain(loop: OpenLoop, _fits: FittedValues, at: Crossings, along: Slopes) -> Reading:
+def _gain(loop: OpenLoop, _fits: FittedValues, crossing: Crossings, along: Slopes) -> Reading:
     """−|L| in dB where L is negative. At half the rate, the place itself is fixed."""
     by_f, by = along
     by_log_f = moved(by_f.imag, by.imag)
-    by_log_f[at.frequency_hz >= loop.rate_hz / 2] = 0.0
+    by_log_f[crossing.frequency_hz >= loop.rate_hz / 2] = 0.0
     moving = by.real + by_f.real[:, np.newaxis] * by_log_f
-    return -_DB * np.log(np.abs(at.open_loop)), -_DB * moving, by_log_f
+    return -_DB * np.log(np.abs(crossing.open_loop)), -_DB * moving, by_log_f
 
 
-def _reduction(loop: OpenLoop, fits: FittedValues, at: Crossings, along: Slopes) -> Reading:
-    value, by, by_log_f = _gain(loop, fits, at, along)
+def _reduction(loop: OpenLoop, fits: FittedValues, crossing: Crossings, along: Slopes) -> Reading:
+    value, by, by_log_f = _gain(loop, fits, crossing, along)
     return -value, -by, by_log_f
 
 
-def _phase(_loop: OpenLoop, _fits: FittedValues, at: Crossings, along: Slopes) -> Reading:
+def _phase(_loop: OpenLoop, _fits: FittedValues, crossing: Crossings, along: Slopes) -> Reading:
     """Angle of −L where |L| = 1, deg."""
     by_f, by = along
     by_log_f = moved(by_f.real, by.real)
-    turn = np.degrees(np.angle(-at.open_loop))
+    turn = np.degrees(np.angle(-crossing.open_loop))
     return turn, np.degrees(by.imag + by_f.imag[:, np.newaxis] * by_log_f), by_log_f
 
 
-def _delay(loop: OpenLoop, fits: FittedValues, at: Crossings, along: Slopes) -> Reading:
+def _delay(loop: OpenLoop, fits: FittedValues, crossing: Crossings, along: Slopes) -> Reading:
     """The delay that rotates L to −1 where |L| = 1, ms."""
-    turn, by_turn, by_log_f = _phase(loop, fits, at, along)
-    late = (turn % 360) / 360e-3 / at.frequency_hz
-    by = by_turn / 360e-3 / at.frequency_hz[:, np.newaxis] - late[:, np.newaxis] * by_log_f
+    turn, by_turn, by_log_f = _phase(loop, fits, crossing, along)
+    late = (turn % 360) / 360e-3 / crossing.frequency_hz
+    by = by_turn / 360e-3 / crossing.frequency_hz[:, np.newaxis] - late[:, np.newaxis] * by_log_f
     return late, by, by_log_f
 
 
-def _peak(loop: OpenLoop, fits: FittedValues, at: Crossings, along: Slopes) -> Reading:
+def _peak(loop: OpenLoop, fits: FittedValues, crossing: Crossings, along: Slopes) -> Reading:
     """1/|1 + L| at its maximum; to first order a shift of the place has no effect."""
-    largest = 1 / np.abs(1 + at.open_loop)
-    closed = at.open_loop / (1 + at.open_loop)
+    largest = 1 / np.abs(1 + crossing.open_loop)
+    closed = crossing.open_loop / (1 + crossing.open_loop)
     by = -largest[:, np.newaxis] * (closed[:, np.newaxis] * along.by_parameter).real
-    return largest, by, peak_moved(loop, fits, at)
+    return largest, by, peak_moved(loop, fits, crossing)
 
 
-def _bandwidth(_loop: OpenLoop, _fits: FittedValues, at: Crossings, along: Slopes) -> Reading:
+def _bandwidth(_loop: OpenLoop, _fits: FittedValues, crossing: Crossings, along: Slopes) -> Reading:
     by_f, by = along
-    sensitivity = 1 / (1 + at.open_loop)
+    sensitivity = 1 / (1 + crossing.open_loop)
     by_log_f = moved((sensitivity * by_f).real, (sensitivity[:, np.newaxis] * by).real)
-    return at.frequency_hz, at.frequency_hz[:, np.newaxis] * by_log_f, by_log_f
+    return crossing.frequency_hz, crossing.frequency_hz[:, np.newaxis] * by_log_f, by_log_f
 
 
 _READING = (_gain, _reduction, _phase, _delay, _peak, _bandwidth)
 
 
-def slopes(loop: OpenLoop, fits: FittedValues, at: Crossings) -> Slopes:
+def slopes(loop: OpenLoop, fits: FittedValues, crossing: Crossings) -> Slopes:
     """Central differences of ln L at these places; by frequency one-sided at half the rate."""
-    return _slopes(loop, fits.of(at.row), at.frequency_hz)
+    return _slopes(loop, fits.of(crossing.row), crossing.frequency_hz)
 
 
 def _slopes(loop: OpenLoop, fits: FittedValues, frequency_hz: Floats) -> Slopes:
@@ -265,9 +267,9 @@ def _slopes(loop: OpenLoop, fits: FittedValues, frequency_hz: Floats) -> Slopes:
     # All in one call: for few places the number of calls determines the time.
     tried = np.concatenate([values[np.newaxis], values[np.newaxis], values + shifts, values - shifts])
     at_hz = np.concatenate([above, below, np.tile(frequency_hz, 2 * free.size)])
-    found = loop.at(tried.reshape(-1, n), at_hz[:, np.newaxis]).reshape(len(tried), places)
-    by_frequency = np.log(found[0] / found[1]) / np.log(above / below)
-    plus, minus = found[2 : 2 + free.size], found[2 + free.size :]
+    open_loop = loop.at(tried.reshape(-1, n), at_hz[:, np.newaxis]).reshape(len(tried), places)
+    by_frequency = np.log(open_loop[0] / open_loop[1]) / np.log(above / below)
+    plus, minus = open_loop[2 : 2 + free.size], open_loop[2 + free.size :]
     by_parameter = np.zeros(values.shape, dtype=np.complex128)
     # A parameter that only some rows move has no step in the others where it is zero.
     shares = np.divide(sigma[:, free], 2 * step, out=np.zeros(step.shape), where=step > 0)
@@ -281,21 +283,21 @@ def moved(residual: Floats, by: Floats) -> Floats:
         return np.asarray(-by / residual[:, np.newaxis])
 
 
-def peak_moved(loop: OpenLoop, fits: FittedValues, at: Crossings) -> Floats:
+def peak_moved(loop: OpenLoop, fits: FittedValues, crossing: Crossings) -> Floats:
     """d ln f by each parameter of the frequency where |1 + L| is least; NaN at half the rate, where it is fixed."""
-    inside = at.frequency_hz < loop.rate_hz / 2
-    found = np.full((len(at.row), fits.values.shape[1]), np.nan)
+    inside = crossing.frequency_hz < loop.rate_hz / 2
+    slope = np.full((len(crossing.row), fits.values.shape[1]), np.nan)
     if inside.any():
-        f, row = at.frequency_hz[inside], at.row[inside]
+        f, row = crossing.frequency_hz[inside], crossing.row[inside]
         both = np.concatenate([f * np.exp(-_PEAK_STEP), f * np.exp(_PEAK_STEP)])
         by_f, by = _distance_slopes(loop, fits.of(np.tile(row, 2)), both)
-        found[inside] = moved(by_f[len(f) :] - by_f[: len(f)], by[len(f) :] - by[: len(f)])
-    return found
+        slope[inside] = moved(by_f[len(f) :] - by_f[: len(f)], by[len(f) :] - by[: len(f)])
+    return slope
 
 
 def _distance_slopes(loop: OpenLoop, fits: FittedValues, frequency_hz: Floats) -> tuple[Floats, Floats]:
-    """Of ln|1 + L|: by ln f and by each parameter."""
+    """Slopes of ln|1 + L|: by ln f and by each parameter."""
     value = loop.at(fits.values, frequency_hz[:, np.newaxis])[:, 0]
     closed = value / (1 + value)
-    found = _slopes(loop, fits, frequency_hz)
-    return (closed * found.by_frequency).real, (closed[:, np.newaxis] * found.by_parameter).real
+    by = _slopes(loop, fits, frequency_hz)
+    return (closed * by.by_frequency).real, (closed[:, np.newaxis] * by.by_parameter).real

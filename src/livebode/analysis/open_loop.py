@@ -17,10 +17,10 @@ from livebode.kernel import FeedbackSeries, FitModel, MarginGrid
 _LOWEST = 1e-7  # of the rate: far below every corner of a drive's controllers
 _PER_DECADE_OUTSIDE, _PER_DECADE = 30, 150
 _POINTS_IN_A_PEAK = 3.0  # in half the width of a resonance
-_POINTS_MAX = 4000
+_POINTS_MAX = 4000  # a resonance far beyond the band may ask for more
 _FREQUENCY_STEP, _DAMPING_STEP = 1.25, 2.0  # factors, to which resonances are rounded
 _STEPS_MAX, _NO_PEAK = 1000, 1 << 20
-_KNOWN_MAX = 32
+_KNOWN_MAX = 32  # grids in memory; a run needs few, because resonances are rounded
 
 # Of the series of the controllers.
 _DEGREE = 15
@@ -97,7 +97,7 @@ class OpenLoop:
         return {}
 
     def behind(self, extra: Model) -> OpenLoop:
-        """The same with one more filter in series."""
+        """Open loop with one more filter in series."""
         return replace(self, filters=(*self.filters, extra))
 
     def unstable_poles(self, values: Floats) -> NDArray[np.int64]:
@@ -139,8 +139,8 @@ class OpenLoop:
             if span[0] < nyquist:
                 damping = _DAMPING_STEP ** int(damping_step)
                 parts.append(_spaced(*span, _POINTS_IN_A_PEAK * np.log(10) / max(damping, 1e-4)))
-        found = np.unique(np.concatenate(parts))
-        return np.asarray(found[found <= nyquist])
+        frequencies = np.unique(np.concatenate(parts))
+        return np.asarray(frequencies[frequencies <= nyquist])
 
     def _peaks(self, values: Floats) -> NDArray[np.int64]:
         """Step of the frequency and of the damping ratio of each mode and each pair of zeros, (rows, 2·peaks)."""
@@ -148,14 +148,14 @@ class OpenLoop:
         every = np.concatenate([values, self.plant.derived(values)], axis=-1) if self.plant.derived_names else values
         column = {name: every[..., i] for i, name in enumerate(names)}
         pairs = [(column[n], np.abs(column[f"{n}_damping"])) for n in names if f"{n}_damping" in column]
-        found = np.full((len(values), 2 * len(pairs)), _NO_PEAK)
+        steps_of_peaks = np.full((len(values), 2 * len(pairs)), _NO_PEAK)
         for i, (frequency_hz, damping) in enumerate(pairs):
             kept = np.isfinite(frequency_hz) & np.isfinite(damping) & (frequency_hz > 0)
             steps = np.log(frequency_hz[kept]) / np.log(_FREQUENCY_STEP)
-            found[kept, 2 * i] = np.floor(steps).clip(-_STEPS_MAX, _STEPS_MAX)
+            steps_of_peaks[kept, 2 * i] = np.floor(steps).clip(-_STEPS_MAX, _STEPS_MAX)
             steps = np.log(np.maximum(damping[kept], 1e-4)) / np.log(_DAMPING_STEP)
-            found[kept, 2 * i + 1] = np.floor(steps).clip(-_STEPS_MAX, _STEPS_MAX)
-        return found
+            steps_of_peaks[kept, 2 * i + 1] = np.floor(steps).clip(-_STEPS_MAX, _STEPS_MAX)
+        return steps_of_peaks
 
 
 def _spaced(low: float, high: float, per_decade: float) -> Floats:

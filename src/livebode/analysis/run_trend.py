@@ -83,11 +83,11 @@ class QuantityRows:
         """The run as one point."""
         time_s, value, sigma = self.rows.T
         middle = float(np.median(value))
-        at = int(np.argmin(np.abs(value - middle)))
+        row = int(np.argmin(np.abs(value - middle)))
         low, high = (float(x) for x in np.quantile(value, (0.05, 0.95)))
         bound = _BOUND_95 * float(np.median(sigma))
         return TrendPoint(
-            self.model, self.name, self.unit, middle, bound, low, high, float(time_s[at]), self._seen
+            self.model, self.name, self.unit, middle, bound, low, high, float(time_s[row]), self._seen
         )  # fmt: skip
 
     def shown(self) -> tuple[Floats, Floats, Floats]:
@@ -119,29 +119,29 @@ class FittedQuantities:
 
     @property
     def quantities(self) -> list[QuantityRows]:
-        """Those with a valid fit."""
+        """Quantities with a valid fit."""
         return list(self._found.values())
 
     def points(self, summary: Mapping[str, Any]) -> list[TrendPoint]:
         """The run as one point for each; margins from run.json where they were not recorded live."""
-        found = [quantity.point for quantity in self.quantities]
-        if any(point.model == MARGINS for point in found):
-            return found
+        points = [quantity.point for quantity in self.quantities]
+        if any(point.model == MARGINS for point in points):
+            return points
         loop, newest = summary.get("loop", {}), summary.get("fit", {}).get("newest", {})
         for name, margin in (loop.get("margins") or {}).items():
             value, bound, time_s = margin.get("value"), margin.get("bound_95"), newest.get("time_s")
             if all(isinstance(x, int | float) and isfinite(x) for x in (value, bound, time_s)):
                 unit = str(margin.get("unit", ""))
-                found.append(TrendPoint(MARGINS, str(name), unit, value, bound, value, value, time_s, 1))
-        return found
+                points.append(TrendPoint(MARGINS, str(name), unit, value, bound, value, value, time_s, 1))
+        return points
 
 
 def fitted_rows(run: RunRecord) -> FittedQuantities:
-    """The valid fits of a run; of one in segments the newest 64 MiB."""
-    found = FittedQuantities()
+    """The valid fits of a run: the newest 64 MiB."""
+    quantities = FittedQuantities()
     for table in run.tables("parameters", _NEWEST_BYTES):
-        found.add(table)
-    return found
+        quantities.add(table)
+    return quantities
 
 
 def trend_points(run: RunRecord) -> list[TrendPoint]:

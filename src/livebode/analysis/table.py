@@ -30,8 +30,6 @@ class Analysis(NamedTuple):
     test
         Test of the run's model on independent data, for `livebode report --on`. Called with the run directory and the
         recording; returns a `ModelTest`.
-    trial
-        Class whose objects answer the page where a person tries other gains (`livebode.dashboard.LoopTrialAnswers`).
     """
 
     function: str
@@ -39,7 +37,6 @@ class Analysis(NamedTuple):
     filter: str = ""
     loop: str = ""
     test: str = ""
-    trial: str = ""
 
 
 def first_analysis(attribute: str) -> Any:
@@ -86,5 +83,5 @@ def model_test(directory: Path, on: Path) -> ModelTest:
             "install the wing control of livebode",
             argument="on",
         )
-    found: ModelTest = test(directory, on)
-    return found
+    result: ModelTest = test(directory, on)
+    return result

@@ -15,6 +15,7 @@ from livebode.cli.options import Output as Output
 from livebode.cli.options import Port as Port
 from livebode.cli.options import ReportLanguage as ReportLanguage
 from livebode.cli.options import ServeFile as ServeFile
+from livebode.cli.options import check_use as check_use
 from livebode.cli.options import parsed_band as parsed_band
 from livebode.cli.pictures import can_draw as can_draw
 from livebode.cli.pictures import margins_in_short as margins_in_short

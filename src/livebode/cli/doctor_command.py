@@ -9,7 +9,7 @@ import typer
 
 from livebode.cli import terminal
 from livebode.cli.file_schema import print_schema
-from livebode.cli.options import Json
+from livebode.cli.options import Json, check_use
 from livebode.cli.receivers import show_receivers
 
 if TYPE_CHECKING:
@@ -20,6 +20,7 @@ _STYLES = {"not applicable": "dim", "ok": "green", "warning": "yellow", "failed"
 
 
 def doctor_command(
+    context: typer.Context,
     targets: Annotated[
         list[Path] | None, typer.Argument(metavar="[AXIS.toml] [RUN]", help="A configuration, and a run's directory.")
     ] = None,
@@ -55,6 +56,8 @@ def doctor_command(
     Exit code 2 where a check or a test message failed. No data is changed; a connection is opened and closed. The first
     line of a TOML file names the schema for the editor: `#:schema ./axis.schema.json`.
     """
+    check_use(context, "--schema NAME", ("--out",), ("--force",))
+    check_use(context, "--receivers list", ())
     if schema is not None:
         print_schema(schema, out, force=force, as_json=as_json)
     elif receivers is not None:

@@ -29,6 +29,7 @@ _IN_PYTHON = {
 
 
 def export_command(
+    context: typer.Context,
     run: Annotated[Path, typer.Argument(metavar="RUN", help="Run directory.", parser=location)],
     to: Annotated[
         str | None,
@@ -66,8 +67,7 @@ def export_command(
     that is still recording, and has no access to files. DuckDB, pandas and Polars can also read the Parquet files
     directly. `livebode archive list --sql` is the same for all runs of a lake.
     """
-    chosen = {"--at": at is not None, "--mean": mean, "--parameters": parameters, "--lpv": lpv}
-    check_query(sql, as_csv=as_csv, as_json=as_json, others={"--to": to, "--out": out, "--entry": entry, **chosen})
+    check_query(context, as_csv=as_csv, as_json=as_json)
     if sql is not None:
         _print_rows(run, sql, rows, as_csv=as_csv, as_json=as_json)
         return
@@ -81,6 +81,7 @@ def export_command(
     from livebode import export
     from livebode.records import RunRecord, to_json
 
+    chosen = {"--at": at is not None, "--mean": mean, "--parameters": parameters, "--lpv": lpv}
     formats = export.writers("model" if lpv else "parameters" if parameters else "responses")
     chosen["--entry"] = lpv and entry is not None
     _check(to, chosen, tuple(formats))
@@ -128,7 +129,7 @@ def responses(record: RunRecord, at: float | None, mean: bool) -> Iterator[Respo
     from livebode.core import Responses
 
     if at is not None:
-        return iter([Responses.of(export.at(record.batches(), at))])
+        return iter([Responses.of(export.nearest_response(record.batches(), at))])
     if mean:
         from livebode.analysis import mean_of
 

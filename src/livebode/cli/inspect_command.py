@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -10,7 +9,7 @@ import typer
 
 from livebode.cli import terminal
 from livebode.cli.configuration_dialog import write_configuration
-from livebode.cli.options import Excitation, Json, Output
+from livebode.cli.options import Excitation, Json, Output, check_use
 from livebode.cli.recording_options import Dbc, From, Rate, SkipPeriods, Time, To
 from livebode.core import UsageError, counted
 from livebode.locations import location
@@ -24,12 +23,15 @@ _SUITS = {
     "joint": "the excitation repeats; name the plant input by --input, and in an open loop take --estimator direct",
     "lpm": "for an excitation that does not repeat, in open and closed loop",
 }
+_OF_CONFIGURATION = ("--schedule", "--estimator", "--average", "--fit", "--yes", "--force")
+_OF_BOTH = ("--excitation", "--input", "--output", "--rate", "--time", "--dbc")
 _LINES_SHOWN = 24
 _STRETCHES_SHOWN = 16
 _WIDTH_MAX = 4096
 
 
 def inspect_command(
+    context: typer.Context,
     log: Annotated[str, typer.Argument(metavar="LOG", help="A recording.")],
     out: Annotated[
         Path | None,
@@ -81,9 +83,7 @@ def inspect_command(
     values, ask, find lines and window, and write the configuration. What an option gives is not asked for; "-" means no
     channel.
     """
-    part = {"--lines": lines, "--window": window, "--from": from_, "--to": to, "--skip-periods": skip_periods}
-    chosen = {"--schedule": schedule, "--estimator": estimator, "--average": average, "--fit": fit}
-    _check_out(out, part, chosen | {"--yes": yes or None, "--force": force or None})
+    check_use(context, "--out axis.toml", _OF_CONFIGURATION, _OF_BOTH)
     if out is not None:
         given = {"excitation": excitation, "input": input_, "output": output, "schedule": schedule}
         write_configuration(
@@ -122,22 +122,6 @@ def inspect_command(
         console.print(f"The excitation is not recognised: {found.unrecognised}", soft_wrap=True)
     if found.estimator:
         console.print(f"estimator of a run: --estimator {found.estimator} ({_SUITS[found.estimator]})", soft_wrap=True)
-
-
-def _check_out(out: Path | None, without: Mapping[str, object], needing: Mapping[str, object]) -> None:
-    """UsageError for an option that belongs to the list of channels, or to the configuration."""
-    given = [option for option, value in (needing if out is None else without).items() if value is not None]
-    if given and out is None:
-        raise UsageError(
-            "missing",
-            f"{given[0]} is for the configuration of the recording",
-            "give --out axis.toml too",
-            options=[given[0], "--out"],
-        )
-    if given:
-        raise UsageError(
-            "conflict", f"{given[0]} and --out exclude each other", "give one of them", options=[given[0], "--out"]
-        )
 
 
 def _check(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from pathlib import Path
 from typing import Annotated
 
@@ -62,6 +63,36 @@ ServeFile = Annotated[
     ),
 ]
 Serve = Annotated[bool, typer.Option("--serve", help="Show the run in a browser while it is recorded.")]
+
+
+def check_use(context: typer.Context, switch: str, own: Collection[str], shared: Collection[str] = ()) -> None:
+    """UsageError for a specified option of the other use of a command that an option switches.
+
+    Parameters
+    ----------
+    context
+        Of the command.
+    switch
+        The option, with its metavar: `--sql QUERY`.
+    own
+        Options that have a meaning with `switch` only.
+    shared
+        Options of both uses, beside --json; the others have no meaning with `switch`.
+    """
+    options = {max(one.opts, key=len): str(one.name) for one in context.command.params}
+    sources = {option: context.get_parameter_source(name) for option, name in options.items()}
+    given = [option for option, source in sources.items() if source is not None and source.name == "COMMANDLINE"]
+    use = switch.split()[0]
+    own_given = [option for option in given if option in own]
+    other = [option for option in given if option.startswith("--") and option not in (use, *own, *shared, "--json")]
+    if use in given and other:
+        raise UsageError(
+            "conflict", f"{other[0]} and {use} exclude each other", "give one of them", options=[other[0], use]
+        )
+    if use not in given and own_given:
+        raise UsageError(
+            "missing", f"{own_given[0]} belongs to {use}", f"give {switch} too", options=[own_given[0], use]
+        )
 
 
 def known_language(code: str | None) -> str | None:

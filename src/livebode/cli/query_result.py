@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import csv
 import sys
-from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from livebode.cli import terminal
+from livebode.cli.options import check_use
 from livebode.core import UsageError
 
 if TYPE_CHECKING:
@@ -21,17 +21,9 @@ RowsMax = Annotated[
 Csv = Annotated[bool, typer.Option("--csv", help="Print the rows of --sql as CSV.")]
 
 
-def check_query(sql: str | None, *, as_csv: bool, as_json: bool, others: Mapping[str, object]) -> None:
-    """UsageError if a query has two forms or another option of the command, or --csv has no query."""
-    given = [option for option, value in others.items() if value]
-    if sql is not None and given:
-        raise UsageError(
-            "conflict", f"--sql and {given[0]} exclude each other", "give one of them", options=["--sql", given[0]]
-        )
-    if as_csv and sql is None:
-        raise UsageError(
-            "missing", "--csv is for the rows of a query", "give --sql QUERY too", options=["--csv", "--sql"]
-        )
+def check_query(context: typer.Context, *, as_csv: bool, as_json: bool) -> None:
+    """UsageError if a query has two forms or another option of the command, or its options have no query."""
+    check_use(context, "--sql QUERY", ("--rows", "--csv"))
     if as_csv and as_json:
         raise UsageError(
             "conflict",

@@ -75,7 +75,7 @@ def beside(run: Path) -> Path:
 def recorded_at(place: Location, *, segments: bool) -> Iterator[tuple[Path, Callable[[], None]]]:
     """The directory in which a run for this place is recorded, and what uploads it if that is a URL.
 
-    LocationError if the run is recorded in segments, or something is at the URL.
+    LocationError if the run is recorded with a journal, or something is at the URL.
     """
     if isinstance(place, Path):
         yield place, _nothing

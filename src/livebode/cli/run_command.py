@@ -32,7 +32,6 @@ from livebode.locations import location
         "noise": ("--noise", ""),
         "differenced": ("--difference", "CHANNEL"),
         "spikes": ("--spikes", "CHANNEL"),
-        "hann": ("--hann", ""),
         "accept_roles": ("--accept-roles", ""),
         "all_periods": ("--all-periods", ""),
     },

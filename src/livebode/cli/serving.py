@@ -25,11 +25,11 @@ def print_line(sentence: str) -> None:
 
 def dashboard_of(section: ServeSection, port: int | None) -> Dashboard:
     """The dashboard of a configuration; `port` overrides its port."""
-    from livebode.dashboard import Dashboard, Serving
+    from livebode.dashboard import Dashboard, ServerSettings
 
     if port is not None:
         section = section.model_copy(update={"port": port})
-    return Dashboard(Serving.of(section), print_line)
+    return Dashboard(ServerSettings.of(section), print_line)
 
 
 @contextmanager

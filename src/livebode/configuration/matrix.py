@@ -9,7 +9,7 @@ from livebode.core import ConfigError, Model
 
 if TYPE_CHECKING:
     from livebode.configuration.loop_section import ControllerSection, LoopSection
-    from livebode.mimo import MatrixLoop
+    from livebode.core import MatrixLoop
 
 
 def check_controllers(loop: LoopSection, outputs: Sequence[str], inputs: Sequence[str]) -> None:
@@ -35,7 +35,7 @@ def _check_controller(controller: ControllerSection, outputs: Sequence[str], inp
 
 def matrix_loop(loop: LoopSection, inputs: list[str], outputs: list[str], rate_hz: float) -> MatrixLoop:
     """The loop of these [[loop.controllers]], recorded at `rate_hz`; ConfigError if a controller cannot be built."""
-    from livebode.mimo import MatrixLoop
+    from livebode.core import MatrixLoop
 
     feedback: list[list[Model | None]] = [[None] * len(outputs) for _ in inputs]
     for controller in loop.controllers:

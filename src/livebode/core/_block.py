@@ -193,7 +193,7 @@ class Block:
         return replace(self, data=self.data[:, first:last], start=self.start + first, gap=self.gap and first == 0)
 
 
-def nearest_name(name: str, names: Iterable[str], what: str = "Channels") -> str:
+def nearest_name(name: str, names: Iterable[str], kind: str = "Channels") -> str:
     """The remedy for a name that does not exist: the nearest one, and all of them, which are `what`.
 
     >>> nearest_name("iq_adX", ["iq_adx", "theta_mx"])
@@ -203,7 +203,7 @@ def nearest_name(name: str, names: Iterable[str], what: str = "Channels") -> str
     folded = {k.casefold(): k for k in known}
     near = difflib.get_close_matches(name.casefold(), folded, n=1, cutoff=0.5)
     hint = f"did you mean {folded[near[0]]!r}? " if near else ""
-    return f"{hint}{what}: {', '.join(known) or 'none'}"
+    return f"{hint}{kind}: {', '.join(known) or 'none'}"
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Responses as objects of pandas, xarray and python-control, which are imported when they are used."""
+"""Responses and matrices as objects of pandas, xarray and python-control, which are imported when they are used."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from pandas import DataFrame
     from xarray import Dataset
 
+    from livebode.core._matrix_responses import MatrixResponses
     from livebode.core._response import Response, Responses
 
 _NAMES = {
@@ -54,8 +55,8 @@ def dataset(responses: Responses) -> Dataset:
     coords["frequency_hz"] = labelled("frequency_hz", "frequency_hz", responses.frequency_hz)
     variables = {name: labelled(both, name, getattr(responses, name)) for name in ("sigma", "coherence", "valid")}
     variables |= {"response": labelled(both, "response", responses.value), "dof": labelled(time, "dof", responses.dof)}
-    found: Dataset = xarray.Dataset(variables, coords, _about(responses))
-    return found
+    converted: Dataset = xarray.Dataset(variables, coords, _about(responses))
+    return converted
 
 
 def frame(responses: Responses) -> DataFrame:
@@ -70,10 +71,10 @@ def frame(responses: Responses) -> DataFrame:
         "valid": responses.valid,
     }
     index = pandas.MultiIndex.from_product([responses.time_s, responses.frequency_hz], names=["time_s", "frequency_hz"])
-    found: DataFrame = pandas.DataFrame({name: values.ravel() for name, values in columns.items()}, index=index)
+    table: DataFrame = pandas.DataFrame({name: values.ravel() for name, values in columns.items()}, index=index)
     units = {"response": responses.unit, "sigma": responses.unit, "magnitude_db": "dB", "phase_deg": "deg"}
-    found.attrs = _about(responses) | {"units": units}
-    return found
+    table.attrs = _about(responses) | {"units": units}
+    return table
 
 
 def frd(response: Response) -> Any:
@@ -87,3 +88,63 @@ def frd(response: Response) -> Any:
 def _about(responses: Responses) -> dict[str, Any]:
     lines = responses.lines
     return {"quantity": responses.quantity, "rate_hz": lines.rate_hz, "window": lines.window}
+
+
+_ENTRY = ("time_s", "frequency_hz", "output", "input")
+_MATRIX_VARIABLES = {
+    "response": ("value", _ENTRY, "complex frequency response"),
+    "sigma": ("sigma", _ENTRY, "standard deviation, E|estimate - truth|^2 = sigma^2"),
+    "noise": ("noise", (*_ENTRY[:3], "other_output"), "covariance of the noise in the outputs of one window"),
+    "spread": ("spread", (*_ENTRY[:2], "input", "other_input"), "covariance of the columns for noise of unit power"),
+    "coherence": ("coherence", _ENTRY[:3], "multiple coherence of the output with all inputs"),
+    "condition": ("condition", _ENTRY[:2], "condition number of the inputs over the experiments"),
+    "valid": ("valid", (*_ENTRY[:2], "input"), "whether the column is valid at this line"),
+    "reason": ("reason", (*_ENTRY[:2], "input"), "why the column is invalid"),
+    "dof": ("dof", _ENTRY[:1], "complex degrees of freedom of the noise"),
+}
+"""Attribute, dimensions and long name of each variable."""
+_MATRIX_TIMES = {
+    "time_s": "mean of the centres of the windows",
+    "first": "number of the oldest sample in the windows",
+    "sample": "number of the newest sample in the windows",
+}
+
+
+def matrix_dataset(responses: MatrixResponses, reasons: tuple[str, ...]) -> Dataset:
+    """For `MatrixResponses.to_xarray`; `reasons` are the words of the numbers in `reason`."""
+    xarray = imported("xarray", "xarray")
+    variables = {
+        name: (dimensions, getattr(responses, attribute), {"long_name": words})
+        for name, (attribute, dimensions, words) in _MATRIX_VARIABLES.items()
+    }
+    variables["reason"][2]["flag_meanings"] = " ".join(word.replace(" ", "_") or "valid" for word in reasons)
+    coords: dict[str, Any] = {
+        name: ("time_s", getattr(responses, name), {"long_name": words}) for name, words in _MATRIX_TIMES.items()
+    }
+    coords["time_s"][2]["units"] = "s"
+    coords["frequency_hz"] = ("frequency_hz", responses.frequency_hz, {"long_name": "line", "units": "Hz"})
+    for kind, names in (("output", responses.outputs), ("input", responses.inputs)):
+        coords[kind], coords[f"other_{kind}"] = list(names), list(names)
+    if responses.units:
+        coords["unit"] = (
+            ("output", "input"),
+            [list(row) for row in responses.units],
+            {"long_name": "of response and sigma"},
+        )
+    about = {"quantity": "plant", "rate_hz": responses.lines.rate_hz, "window": responses.lines.window}
+    converted: Dataset = xarray.Dataset(variables, coords, about)
+    return converted
+
+
+def matrix_frd(responses: MatrixResponses, row: int) -> Any:
+    """For `MatrixResponses.to_frd`."""
+    control = imported("control", "control", "python-control")
+    whole = responses.valid[row].all(axis=1)
+    # `control.bode_plot` draws no system without a name.
+    return control.frd(
+        np.moveaxis(responses.value[row, whole], 0, 2),
+        2 * np.pi * responses.frequency_hz[whole],
+        inputs=list(responses.inputs),
+        outputs=list(responses.outputs),
+        name="plant",
+    )

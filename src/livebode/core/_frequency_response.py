@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
     from livebode.core._response import Responses
 
-
 PlotKind = Literal["bode", "nyquist", "nichols"]
 
 
@@ -47,7 +46,7 @@ class FrequencyResponse:
     unit: str
 
     def _batch(self) -> Responses:
-        """This response as Responses."""
+        """Responses with this one as the only row, or all."""
         raise NotImplementedError
 
     def __call__(self, frequency_hz: ArrayLike) -> Any:
@@ -112,11 +111,11 @@ measured line; the nearest are 50 and 60 Hz
         (2,)
         """
         if isinstance(frequency_hz, slice):
-            at = within(self.lines, frequency_hz)
+            positions = within(self.lines, frequency_hz)
         else:
-            at = np.unique(position(self.lines, np.atleast_1d(frequency_hz)))
-        columns: dict[str, Any] = {name: getattr(self, name)[..., at] for name in PER_LINE}
-        return replace(self, lines=self.lines.take(at), **columns)  # type: ignore[type-var]
+            positions = np.unique(position(self.lines, np.atleast_1d(frequency_hz)))
+        columns: dict[str, Any] = {name: getattr(self, name)[..., positions] for name in PER_LINE}
+        return replace(self, lines=self.lines.take(positions), **columns)  # type: ignore[type-var]
 
     def plot(
         self,

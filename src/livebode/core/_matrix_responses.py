@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from livebode.arrays import Complex, Floats
-from livebode.core._matrix_conversion import dataset, frd
+from livebode.core._conversion import matrix_dataset, matrix_frd
 from livebode.core._response import Responses, widened
 from livebode.core.errors import GridError, UsageError
 from livebode.core.lines import Lines, ends, position, within
@@ -124,10 +124,10 @@ class MatrixResponses(RowArrays):
 
         They depend on the units of inputs and outputs: scale these first where the units differ.
         """
-        found = np.full((*self.value.shape[:2], min(self.value.shape[2:])), np.nan)
+        values = np.full((*self.value.shape[:2], min(self.value.shape[2:])), np.nan)
         whole = self.valid.all(axis=2)
-        found[whole] = np.linalg.svd(self.value[whole], compute_uv=False)
-        return found
+        values[whole] = np.linalg.svd(self.value[whole], compute_uv=False)
+        return values
 
     def singular_value_bound(self, c: float = 2.0) -> Floats:
         """Radius around each singular value, shape of `singular_values`.
@@ -139,13 +139,13 @@ class MatrixResponses(RowArrays):
         several differ by less than their radii: they repel each other, and of three the outer ones are covered less
         often. docs/explanation/mimo.md has the measured shares.
         """
-        found = np.full(self.singular_values.shape, np.nan)
+        radius = np.full(self.singular_values.shape, np.nan)
         whole = self.valid.all(axis=2)
         left, _, right = np.linalg.svd(self.value[whole], full_matrices=False)
         noise = np.einsum("nok,nop,npk->nk", left.conj(), self.noise[whole], left).real
         spread = np.einsum("nki,nij,nkj->nk", right.conj(), self.spread[whole], right).real
-        found[whole] = np.sqrt(np.maximum(noise * spread, 0.0))
-        return widened(found, self.dof[:, np.newaxis, np.newaxis], c)
+        radius[whole] = np.sqrt(np.maximum(noise * spread, 0.0))
+        return widened(radius, self.dof[:, np.newaxis, np.newaxis], c)
 
     def bound(self, c: float = 2.0) -> Floats:
         """Radius that covers the truth with probability 1 − exp(−c²), for each entry alone, shape of `value`."""
@@ -236,25 +236,25 @@ class MatrixResponses(RowArrays):
 
     def why(self, row: int = -1) -> list[Message]:
         """Sentences about the columns that are invalid in a row: which, at how many lines, and the reason."""
-        found = []
+        sentences = []
         for i, name in enumerate(self.inputs):
             for number, word in enumerate(REASONS):
-                at = self.frequency_hz[self.reason[row, :, i] == number]
-                if number and at.size:
-                    where = Message("{line_hz:g} Hz", line_hz=at[0])
-                    if at.size > 1:
+                at_hz = self.frequency_hz[self.reason[row, :, i] == number]
+                if number and at_hz.size:
+                    where = Message("{line_hz:g} Hz", line_hz=at_hz[0])
+                    if at_hz.size > 1:
                         where = Message(
                             "{lines} lines from {low_hz:g} to {high_hz:g} Hz",
-                            lines=at.size,
-                            low_hz=at[0],
-                            high_hz=at[-1],
+                            lines=at_hz.size,
+                            low_hz=at_hz[0],
+                            high_hz=at_hz[-1],
                         )
-                    found.append(
+                    sentences.append(
                         Message(
                             "column {column} is invalid at {where}: {why}", column=name, where=where, why=_WHY[word]
                         )
                     )
-        return found
+        return sentences
 
     def transformed(
         self, outputs: ArrayLike, inputs: ArrayLike, names: tuple[tuple[str, ...], tuple[str, ...]]
@@ -375,7 +375,7 @@ class MatrixResponses(RowArrays):
         >>> bool(np.allclose(covariance, responses.covariance))
         True
         """
-        return dataset(self, REASONS)
+        return matrix_dataset(self, REASONS)
 
     def to_frd(self, row: int = -1) -> Any:
         """python-control's FrequencyResponseData of one row, in rad/s, at lines where all columns are valid.
@@ -387,7 +387,7 @@ class MatrixResponses(RowArrays):
         ExtraError
             If python-control is not installed.
         """
-        return frd(self, row)
+        return matrix_frd(self, row)
 
     def __repr__(self) -> str:
         return (
@@ -431,4 +431,4 @@ def _at(which: str | int, names: tuple[str, ...], kind: str) -> int:
 def _several(which: Names, names: tuple[str, ...], kind: str) -> list[int]:
     if which is None:
         return list(range(len(names)))
-    return [_at(one, names, kind) for one in ([which] if isinstance(which, str | int) else which)]
+    return [_at(name, names, kind) for name in ([which] if isinstance(which, str | int) else which)]

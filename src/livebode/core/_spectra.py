@@ -241,6 +241,6 @@ class Spectra(Block):
 
 def rms(sums: NDArray[np.complex128], layout: SpectraLayout) -> NDArray[np.float64]:
     """Root mean square of the signals at the lines, shape (signals, spectra), from sums of that layout."""
-    at = sums[..., : len(layout.lines)]
+    excited = sums[..., : len(layout.lines)]
     with np.errstate(over="ignore", invalid="ignore"):  # of non-finite numbers
-        return np.asarray(np.sqrt(2 * (at.real**2 + at.imag**2).sum(axis=-1)) / layout.window)
+        return np.asarray(np.sqrt(2 * (excited.real**2 + excited.imag**2).sum(axis=-1)) / layout.window)

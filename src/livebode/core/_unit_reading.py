@@ -99,33 +99,33 @@ def split_plant_unit(text: str) -> tuple[str, str]:
     (('rad/s', 'N m'), ('m', 'A'), ('', ''))
     """
     depth = 0
-    for at in range(len(text) - 1, 0, -1):
-        depth += (text[at] == ")") - (text[at] == "(")
+    for index in range(len(text) - 1, 0, -1):
+        depth += (text[index] == ")") - (text[index] == "(")
         if depth <= 0:
-            return (text[: at - 1], text[at + 1 : -1]) if text[at - 1] == "/" and text[-1] == ")" else ("", "")
+            return (text[: index - 1], text[index + 1 : -1]) if text[index - 1] == "/" and text[-1] == ")" else ("", "")
     return "", ""
 
 
 @lru_cache(maxsize=1024)
 def _read(text: str) -> UnitReading:
-    found = _dimension(_tokens(unicodedata.normalize("NFKC", text).replace("−", "-").strip("[] ")))
-    if found is None:
+    reading = _dimension(_tokens(unicodedata.normalize("NFKC", text).replace("−", "-").strip("[] ")))
+    if reading is None:
         return UnitReading()
-    factor, dimension = found
+    factor, dimension = reading
     kind = _KIND_OF.get(dimension, "other")
     return UnitReading(kind, factor, kind == "torque" or dimension[0] == 0) if kind != "other" else UnitReading()
 
 
 def _tokens(text: str) -> list[re.Match[str]] | None:
     """The words and marks of a text; None if there is anything else in it."""
-    found, at = [], 0
-    while at < len(text):
-        match = _TOKEN.match(text, at)
+    tokens, index = [], 0
+    while index < len(text):
+        match = _TOKEN.match(text, index)
         if match is None:
             return None
-        found.append(match)
-        at = match.end()
-    return found
+        tokens.append(match)
+        index = match.end()
+    return tokens
 
 
 def _dimension(tokens: list[re.Match[str]] | None) -> tuple[float, _Dimension] | None:

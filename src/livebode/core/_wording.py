@@ -5,20 +5,20 @@ from math import floor, isfinite, log10
 from livebode.language import number, tr
 
 
-def counted(count: int, what: str = "response") -> str:
+def counted(count: int, noun: str = "response") -> str:
     """
     >>> counted(1), counted(3)
     ('1 response', '3 responses')
     """
-    return f"{count} {plural(what, count)}"
+    return f"{count} {plural(noun, count)}"
 
 
-def plural(what: str, count: int) -> str:
+def plural(noun: str, count: int) -> str:
     """
     >>> plural("option", 1), plural("option", 2)
     ('option', 'options')
     """
-    return what if count == 1 else f"{what}s"
+    return noun if count == 1 else f"{noun}s"
 
 
 def rounded_down(value: float) -> float:

@@ -71,8 +71,8 @@ class RunClock:
         """Seconds since 1970; None where nothing is known."""
         if not self.pieces:
             return None
-        at = bisect_right(self.pieces, time_s, key=lambda piece: piece[0])
-        return time_s + self.pieces[max(0, at - 1)][1]
+        index = bisect_right(self.pieces, time_s, key=lambda piece: piece[0])
+        return time_s + self.pieces[max(0, index - 1)][1]
 
 
 _CLOCK: ContextVar[RunClock | None] = ContextVar("clock of the run that messages refer to", default=None)

@@ -17,7 +17,7 @@ from livebode.arrays import Floats
 normal_quantile = NormalDist().inv_cdf
 """Value that a standard normal variable remains below with a probability."""
 
-_SETTLED, _STEPS_MAX = 1e-13, 100
+_SETTLED, _STEPS_MAX = 1e-13, 100  # some units in the last place, and an end where rounding keeps a step larger
 
 
 def f_exceeded(value: float, numerator: int, denominator: float) -> float:
@@ -40,17 +40,17 @@ def f_quantile(chance: float, numerator: int, denominator: float) -> float:
     a, b = numerator / 2, denominator / 2
     weights = _log_weights(numerator, denominator)
     scale = lgamma(a + b) - lgamma(a) - lgamma(b)
-    at = 0.0
+    logarithm = 0.0
     for _ in range(_STEPS_MAX):
-        value = exp(at)
+        value = exp(logarithm)
         tail = _f_tail(value, denominator, weights)
         share = a * value / (a * value + b)
         log_density = scale + a * log(share) + b * log(b / (a * value + b))  # of the logarithm of F
         step = (tail - log(chance)) * exp(tail - log_density)
-        at += step
+        logarithm += step
         if abs(step) <= _SETTLED:
             break
-    return exp(at)
+    return exp(logarithm)
 
 
 def _log_weights(numerator: int, denominator: float) -> Floats:
@@ -121,7 +121,7 @@ def log_sum_exceeded(count: ArrayLike, total: ArrayLike) -> Floats:
     array([0.05, 1.  ])
     """
     counts, totals = np.broadcast_arrays(np.asarray(count, dtype=np.int64), np.asarray(total, dtype=np.float64))
-    found = np.zeros(counts.shape)
+    logarithm = np.zeros(counts.shape)
     rare = totals > counts
     k, x = counts[rare], totals[rare]
     term, series = np.ones(k.size), np.ones(k.size)
@@ -130,7 +130,7 @@ def log_sum_exceeded(count: ArrayLike, total: ArrayLike) -> Floats:
         series += term
         if (term <= np.finfo(float).eps * series).all():
             break
-    kinds, at = np.unique(k, return_inverse=True)
-    factorial = np.array([lgamma(one) for one in kinds])[at]
-    found[rare] = (k - 1) * np.log(x) - x - factorial + np.log(series)
-    return found
+    kinds, index = np.unique(k, return_inverse=True)
+    factorial = np.array([lgamma(order) for order in kinds])[index]
+    logarithm[rare] = (k - 1) * np.log(x) - x - factorial + np.log(series)
+    return logarithm

@@ -99,8 +99,8 @@ def whole_directory(path: Path, remove: Callable[[Path], None]) -> Iterator[Path
     os.mkdir(partial)
     try:
         yield partial
-        for found in (*partial.rglob("*"), partial):
-            (sync_directory if found.is_dir() else _sync_file)(found)
+        for inner in (*partial.rglob("*"), partial):
+            (sync_directory if inner.is_dir() else _sync_file)(inner)
         _exchange(partial, path, remove)
     finally:
         remove_created(partial)
@@ -126,9 +126,9 @@ def replace_file(path: Path, to: Path) -> None:
 
 def write_all(file: int, data: bytes | memoryview) -> None:
     """Write all bytes to a descriptor; a part may be written where OSError is raised."""
-    rest = memoryview(data)
-    while rest:
-        rest = rest[os.write(file, rest) :]
+    remainder = memoryview(data)
+    while remainder:
+        remainder = remainder[os.write(file, remainder) :]
 
 
 def sync_directory(path: Path) -> None:

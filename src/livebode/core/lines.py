@@ -19,7 +19,7 @@ _LINES_MAX = 100_000
 _DIGITS_MAX, _SHOWN = 40, 120
 CLOCK_ERROR = 2e-4
 """Relative difference up to which two rates are one: that of two quartz clocks, or of a rate estimated from stamps."""
-_BINS_APART_MAX, _BINS_APART = 0.25, 1e-3
+_BINS_APART_MAX, _BINS_APART = 0.25, 1e-3  # of the spacing of bins; `same_frequencies` gives the reason
 WINDOW_MAX = 1 << 24
 """Longest window, samples: that of the kernel; 70 minutes at 4 kHz."""
 
@@ -150,13 +150,13 @@ nearest lines are 20 and 30 Hz, and windows of 320 or 480 samples would fit
     def __len__(self) -> int:
         return len(self.bins)
 
-    def take(self, at: NDArray[np.intp]) -> Lines:
+    def take(self, positions: NDArray[np.intp]) -> Lines:
         """The lines at these positions, with the detection lines between the first and the last of them.
 
         >>> Lines.parse("20:140:40", rate_hz=4000, window=400).take(np.array([0, 1])).frequency_hz
         array([20., 60.])
         """
-        bins = tuple(self.bins[i] for i in at)
+        bins = tuple(self.bins[i] for i in positions)
         quiet = tuple(k for k in self.quiet if min(bins) < k < max(bins))
         return Lines(bins, self.window, self.rate_hz, quiet)
 
@@ -358,11 +358,11 @@ def position(lines: Lines, frequency_hz: ArrayLike) -> NDArray[np.intp]:
     required = np.asarray(frequency_hz, dtype=np.float64)
     bins = required / lines.resolution_hz
     known = np.asarray(lines.bins)
-    at = np.searchsorted(known, np.rint(bins)).clip(0, len(lines) - 1)
-    off = ~(np.abs(known[at] - bins) < ON_GRID_BINS)
+    index = np.searchsorted(known, np.rint(bins)).clip(0, len(lines) - 1)
+    off = ~(np.abs(known[index] - bins) < ON_GRID_BINS)
     if off.any():
         raise _not_measured(lines, float(required[off].flat[0]))
-    return np.asarray(at)
+    return np.asarray(index)
 
 
 def within(lines: Lines, span_hz: slice) -> NDArray[np.intp]:
@@ -370,8 +370,8 @@ def within(lines: Lines, span_hz: slice) -> NDArray[np.intp]:
     f = lines.frequency_hz
     room_hz = ON_GRID_BINS * lines.resolution_hz
     low, high = ends(span_hz, "frequency_hz")
-    at = np.flatnonzero((f >= low - room_hz) & (f <= high + room_hz))
-    if not at.size:
+    positions = np.flatnonzero((f >= low - room_hz) & (f <= high + room_hz))
+    if not positions.size:
         raise GridError(
             "band-without-line",
             f"no measured line is between {low:g} and {high:g} Hz",
@@ -379,7 +379,7 @@ def within(lines: Lines, span_hz: slice) -> NDArray[np.intp]:
             band_hz=[low, high],
             lines_hz=[float(f[0]), float(f[-1])],
         )
-    return at
+    return positions
 
 
 def ends(span: slice, argument: str) -> tuple[float, float]:
@@ -400,7 +400,7 @@ def ends(span: slice, argument: str) -> tuple[float, float]:
 def _not_measured(lines: Lines, frequency_hz: float) -> GridError:
     f = lines.frequency_hz
     nearest = sorted(f[np.argsort(np.abs(f - frequency_hz), kind="stable")[:_NAMED]].tolist())
-    text = " and ".join(f"{one:g}" for one in nearest)
+    text = " and ".join(f"{line_hz:g}" for line_hz in nearest)
     return GridError(
         "line-off",
         f"{frequency_hz:g} Hz is not a measured line, and a measured response is not interpolated",

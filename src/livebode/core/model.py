@@ -83,8 +83,8 @@ class _Control(Algebra):
 
     def response(self, frequency_hz: ArrayLike) -> NDArray[np.complex128]:
         s = 2j * np.pi * np.asarray(frequency_hz, dtype=np.float64)
-        at = np.exp(s * self.system.dt) if self.system.dt else s
-        return np.asarray(self.system(at), dtype=np.complex128).reshape(np.shape(s))
+        argument = np.exp(s * self.system.dt) if self.system.dt else s
+        return np.asarray(self.system(argument), dtype=np.complex128).reshape(np.shape(s))
 
 
 def as_model(thing: object) -> Model:

@@ -42,7 +42,7 @@ def not_installed(message: str, package: str, extra: str, **facts: object) -> Ex
 
 
 @contextmanager
-def needing(package: str, extra: str, what: str) -> Iterator[None]:
+def needing(package: str, extra: str, user: str) -> Iterator[None]:
     """Around the imports of an optional package: ExtraError where it is missing.
 
     Parameters
@@ -69,13 +69,13 @@ def needing(package: str, extra: str, what: str) -> Iterator[None]:
     except ModuleNotFoundError as error:
         if (error.name or "").partition(".")[0] != package.lower():
             raise
-        raise not_installed(f"{what} needs {package}, which is not installed", package.lower(), extra) from None
+        raise not_installed(f"{user} needs {package}, which is not installed", package.lower(), extra) from None
 
 
 def _pip() -> str:
     """The pip of this Python: by its path if another one is found first."""
-    found, here = shutil.which("pip"), Path(sys.executable)
-    if found is not None and Path(found).parent == here.parent:
+    first, here = shutil.which("pip"), Path(sys.executable)
+    if first is not None and Path(first).parent == here.parent:
         return "pip install"
     return f"{_quoted(str(here)) if ' ' in str(here) else here} -m pip install"
 
@@ -112,15 +112,19 @@ def packages_of(extra: str, requires: Sequence[str]) -> list[Requirement]:
     >>> [str(one.name) for one in packages_of("pdf", requires)]
     ['b', 'c']
     """
-    found = []
-    for one in map(_requirement, requires):
-        if one.marker is None or one.marker.evaluate({"extra": ""}) or not one.marker.evaluate({"extra": extra}):
+    packages = []
+    for requirement in map(_requirement, requires):
+        if (
+            requirement.marker is None
+            or requirement.marker.evaluate({"extra": ""})
+            or not requirement.marker.evaluate({"extra": extra})
+        ):
             continue
-        if one.name == "livebode":
-            found += [package for inner in sorted(one.extras) for package in packages_of(inner, requires)]
+        if requirement.name == "livebode":
+            packages += [package for inner in sorted(requirement.extras) for package in packages_of(inner, requires)]
         else:
-            found.append(one)
-    return found
+            packages.append(requirement)
+    return packages
 
 
 @cache  # each extra is looked up in all lines
@@ -131,8 +135,10 @@ def _requirement(line: str) -> Requirement:
 
 
 def _packages(requires: list[str], extras: tuple[str, ...]) -> list[str]:
-    found = [f"{one.name}{one.specifier}" for extra in extras for one in packages_of(extra, requires)]
-    return list(dict.fromkeys(found))
+    packages = [
+        f"{requirement.name}{requirement.specifier}" for extra in extras for requirement in packages_of(extra, requires)
+    ]
+    return list(dict.fromkeys(packages))
 
 
 def _quoted(text: str) -> str:

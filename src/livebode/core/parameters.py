@@ -18,7 +18,7 @@ from livebode.core.rows import RowArrays
 OK = "ok"
 """The status of a valid row; any other status is the reason why the row contains NaN."""
 
-_STEP = 1e-6
+_STEP = 1e-6  # of a value, to both sides: the cube root of the precision is about 6e-6
 
 
 def half_width(sigma: Floats, probability: float) -> Floats:
@@ -89,14 +89,14 @@ class Parameters(RowArrays):
         return f"<Parameters: {self.model}, {', '.join(self.names)}; {valid}>"
 
     @overload
-    def __getitem__(self, at: str) -> Floats: ...
+    def __getitem__(self, rows: str) -> Floats: ...
     @overload
-    def __getitem__(self, at: slice | NDArray[Any]) -> Parameters: ...
-    def __getitem__(self, at: str | slice | NDArray[Any]) -> Floats | Parameters:
+    def __getitem__(self, rows: slice | NDArray[Any]) -> Parameters: ...
+    def __getitem__(self, rows: str | slice | NDArray[Any]) -> Floats | Parameters:
         """The values of one parameter by its name, shape (rows,); or some of the rows."""
-        if isinstance(at, str):
-            return np.asarray(self.value[:, self.index(at)])
-        return super().__getitem__(at)
+        if isinstance(rows, str):
+            return np.asarray(self.value[:, self.index(rows)])
+        return super().__getitem__(rows)
 
     def index(self, name: str) -> int:
         """Column of a parameter; UsageError with the known names where it is not there."""
@@ -112,10 +112,10 @@ class Parameters(RowArrays):
 
     def only(self, names: Sequence[str]) -> Parameters:
         """Some of the parameters, in this order; UsageError where one is not there."""
-        at = [self.index(name) for name in names]
-        units = tuple(self.units[i] for i in at)
-        covariance = self.covariance[:, at][:, :, at]
-        return replace(self, names=tuple(names), units=units, value=self.value[:, at], covariance=covariance)
+        columns = [self.index(name) for name in names]
+        units = tuple(self.units[i] for i in columns)
+        covariance = self.covariance[:, columns][:, :, columns]
+        return replace(self, names=tuple(names), units=units, value=self.value[:, columns], covariance=covariance)
 
     @property
     def ok(self) -> NDArray[np.bool_]:
@@ -149,13 +149,13 @@ class Parameters(RowArrays):
         n, shape = self.value.shape[1], (len(self), len(names))
         value, covariance = np.full(shape, np.nan), np.full((*shape, len(names)), np.nan)
         if (ok := self.ok).any():
-            at, sigma = self.value[ok], self.sigma[ok]
+            values, sigma = self.value[ok], self.sigma[ok]
             moving = np.flatnonzero((sigma > 0).any(axis=0))  # a fixed parameter contributes nothing
             # For a parameter near zero, sigma gives the scale of a small step; one fixed at zero in this row has none.
-            scale = np.maximum(np.abs(at), sigma)[:, moving]
+            scale = np.maximum(np.abs(values), sigma)[:, moving]
             size = _STEP * np.where(scale > 0, scale, 1.0)
             steps = size[..., np.newaxis] * np.eye(n)[moving]
-            middle = at[:, np.newaxis]
+            middle = values[:, np.newaxis]
             # All in one call: for few rows the number of calls determines the time.
             every = of(np.concatenate([middle, middle + steps, middle - steps], axis=1))
             above, below = np.split(every[:, 1:], 2, axis=1)

@@ -41,8 +41,8 @@ def remove_files(directory: Path, names: Iterable[str]) -> int:
             if name in ("", ".", "..") or os.path.basename(name) != name:
                 raise OSError(errno.EINVAL, "not the name of a file, so it is not removed", name)
             with contextlib.suppress(FileNotFoundError):
-                found = os.stat(begin / name, dir_fd=file, follow_symlinks=False)
-                if not stat.S_ISREG(found.st_mode):
+                status = os.stat(begin / name, dir_fd=file, follow_symlinks=False)
+                if not stat.S_ISREG(status.st_mode):
                     raise OSError(errno.EINVAL, f"{name!r} is not a regular file, so it is not removed", name)
                 os.unlink(begin / name, dir_fd=file)
                 removed += 1

@@ -37,16 +37,16 @@ class RowArrays:
     def __len__(self) -> int:
         return len(getattr(self, self._ARRAYS[0]))
 
-    def __getitem__(self, at: slice | NDArray[Any]) -> Self:
+    def __getitem__(self, rows: slice | NDArray[Any]) -> Self:
         kind = type(self)
-        rows = {name: getattr(self, name)[at] for name in kind._ARRAYS}
-        return kind(**rows, **{name: getattr(self, name) for name in kind._SHARED})
+        arrays = {name: getattr(self, name)[rows] for name in kind._ARRAYS}
+        return kind(**arrays, **{name: getattr(self, name) for name in kind._SHARED})
 
     def equals(self, other: Self) -> bool:
         """Whether all values are the same; NaN equals NaN."""
         shared = all(getattr(self, name) == getattr(other, name) for name in self._SHARED)
         pairs = ((getattr(self, name), getattr(other, name)) for name in self._ARRAYS)
-        return shared and all(np.array_equal(one, two, equal_nan=one.dtype.kind in "fc") for one, two in pairs)
+        return shared and all(np.array_equal(own, others, equal_nan=own.dtype.kind in "fc") for own, others in pairs)
 
     @classmethod
     def join(cls, parts: Sequence[Self]) -> Self:

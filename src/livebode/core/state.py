@@ -149,20 +149,20 @@ def decode(stage: Stage, data: bytes, identity: str = "") -> dict[str, Any]:
     StateError
         If the bytes are damaged, or not a state of this stage and these settings in its version.
     """
-    version, text, at, check = _head(stage, data)
+    version, text, offset, check = _head(stage, data)
     try:
-        found = json.loads(text)
-        values: dict[str, Any] = dict(found["plain"])
-        for name, (dtype, shape) in found["arrays"].items():
-            values[name] = _array(data, at, dtype, shape)
-            at += values[name].nbytes
-        if zlib.crc32(memoryview(data)[_SIZE:at]) != check:
+        header = json.loads(text)
+        values: dict[str, Any] = dict(header["plain"])
+        for name, (dtype, shape) in header["arrays"].items():
+            values[name] = _array(data, offset, dtype, shape)
+            offset += values[name].nbytes
+        if zlib.crc32(memoryview(data)[_SIZE:offset]) != check:
             raise ValueError("wrong checksum")
-        for name, length in found["parts"].items():
-            values[name], at = bytes(data[at : at + length]), at + length
-        if at != len(data):
-            raise ValueError(f"{len(data)} bytes instead of {at}")
-        name, settings, writer = found["stage"], found["settings"], str(found.get("livebode", ""))
+        for name, length in header["parts"].items():
+            values[name], offset = bytes(data[offset : offset + length]), offset + length
+        if offset != len(data):
+            raise ValueError(f"{len(data)} bytes instead of {offset}")
+        name, settings, writer = header["stage"], header["settings"], str(header.get("livebode", ""))
     except (*_INVALID, RecursionError) as error:
         _damaged(stage, str(error))
     if name != stage.name:
@@ -230,13 +230,13 @@ def _check_version(stage: Stage, version: int, writer: str) -> None:
         )
 
 
-def _newer(stage: Stage, found: int, readable: int, writer: str) -> NoReturn:
+def _newer(stage: Stage, version: int, readable: int, writer: str) -> NoReturn:
     raise StateError(
         "newer-version",
-        f"{_written(stage, found, writer)}, which reads up to version {readable}",
+        f"{_written(stage, version, writer)}, which reads up to version {readable}",
         _remedy(writer),
         name=stage.name,
-        found=found,
+        found=version,
         readable=readable,
         written_by=writer,
     )
@@ -284,11 +284,11 @@ def _like(now: Any, value: Any, name: str) -> Any:
     return value
 
 
-def _array(data: bytes, at: int, dtype: str, shape: list[int]) -> np.ndarray:
+def _array(data: bytes, offset: int, dtype: str, shape: list[int]) -> np.ndarray:
     if dtype not in DTYPES or not all(type(n) is int and n >= 0 for n in shape):
         raise ValueError(f"array of type {dtype!r} and shape {shape!r}")
-    found = np.frombuffer(data, dtype=dtype, count=math.prod(shape), offset=at).reshape(shape)
-    return found.astype(found.dtype.newbyteorder("="))
+    array = np.frombuffer(data, dtype=dtype, count=math.prod(shape), offset=offset).reshape(shape)
+    return array.astype(array.dtype.newbyteorder("="))
 
 
 def _little_endian(array: np.ndarray) -> np.ndarray:

@@ -10,7 +10,7 @@ _LEVELS_MAX = 2.0**23  # between the smallest and the largest value
 _SINGLE, _DOUBLE = 2.0**-24, 2.0**-50  # relative errors of a value, with room for a few operations in double precision
 _WHOLE = 0.02  # of a step: largest distance of a value from the grid
 _CANCELLED = 1e-5  # of a step: its own error, from the difference of larger ones
-_DIVISIONS_MAX = 64
+_DIVISIONS_MAX = 64  # each at least halves the step, so that this number is never reached
 
 
 def step_of(samples: Floats) -> float:
@@ -46,11 +46,11 @@ def step_of(samples: Floats) -> float:
         if not least <= step < np.inf:
             return 0.0
         multiples = np.rint(differences / step)
-        rest = np.abs(differences - step * multiples)
-        rest = rest[rest > 4 * error * (1 + multiples) + _CANCELLED * step]
-        if not rest.size:
+        remainder = np.abs(differences - step * multiples)
+        remainder = remainder[remainder > 4 * error * (1 + multiples) + _CANCELLED * step]
+        if not remainder.size:
             return _refined(values, step)
-        step = float(rest.min())
+        step = float(remainder.min())
     return 0.0
 
 

@@ -1,6 +1,5 @@
 from livebode.dashboard.access import Role as Role
 from livebode.dashboard.access import error_answer as error_answer
-from livebode.dashboard.admission import serve_browser as serve_browser
 from livebode.dashboard.alarm import AlarmShelf as AlarmShelf
 from livebode.dashboard.alarm import AlarmState as AlarmState
 from livebode.dashboard.alarm_requests import MINUTES_MAX as MINUTES_MAX
@@ -12,14 +11,17 @@ from livebode.dashboard.alarm_requests import alarm_request as alarm_request
 from livebode.dashboard.board import Board as Board
 from livebode.dashboard.board import Pulse as Pulse
 from livebode.dashboard.browser_socket import BrowserSocket as BrowserSocket
+from livebode.dashboard.browser_socket import serve_browser as serve_browser
 from livebode.dashboard.dashboard import Dashboard as Dashboard
 from livebode.dashboard.dashboard import listening as listening
 from livebode.dashboard.hub import Hub as Hub
 from livebode.dashboard.overlays import grid_hz as grid_hz
 from livebode.dashboard.past import Past as Past
+from livebode.dashboard.plugin_pages import Answer as Answer
 from livebode.dashboard.plugin_pages import Order as Order
+from livebode.dashboard.plugin_pages import PageAddition as PageAddition
 from livebode.dashboard.plugin_pages import PluginPages as PluginPages
+from livebode.dashboard.plugin_pages import ShownRun as ShownRun
 from livebode.dashboard.quantities import Quantities as Quantities
 from livebode.dashboard.queries import json_object as json_object
-from livebode.dashboard.server_settings import Serving as Serving
-from livebode.dashboard.trials import LoopTrialAnswers as LoopTrialAnswers
+from livebode.dashboard.server_settings import ServerSettings as ServerSettings

@@ -14,7 +14,7 @@ from math import ceil
 from typing import Any, Literal
 
 from livebode.core import ServerError
-from livebode.dashboard.server_settings import Serving
+from livebode.dashboard.server_settings import ServerSettings
 from livebode.language import Message, for_page
 
 Role = Literal["operator", "viewer"]
@@ -23,7 +23,7 @@ COOKIE = "livebode"
 SESSION_S = 12 * 3600.0
 _SESSIONS_MAX = 64
 _ADDRESSES_MAX = 1024
-_FREE_TRIES = 5
+_FREE_TRIES = 5  # a person mistypes; from here on the pauses double
 _PAUSE_S_MAX = 300.0
 
 
@@ -47,7 +47,7 @@ class Access:
     """
 
     def __init__(
-        self, serving: Serving, report: Callable[[str], None], clock: Callable[[], float] = time.monotonic
+        self, serving: ServerSettings, report: Callable[[str], None], clock: Callable[[], float] = time.monotonic
     ) -> None:
         self._hashes: list[tuple[Role, bytes]] = []
         if serving.token is not None:
@@ -117,7 +117,7 @@ class Access:
         over = [session for session, (_, until_s) in sessions.items() if until_s <= now_s]
         counts = Counter(address for address, _ in sessions.values())
         (most, _), *_ = counts.most_common(1)
-        for session in over or [next(one for one, (address, _) in sessions.items() if address == most)]:
+        for session in over or [next(key for key, (address, _) in sessions.items() if address == most)]:
             del sessions[session]
 
     def _check(self, token: str, address: str) -> Role | None:
@@ -130,13 +130,13 @@ class Access:
                 Message("try again in {seconds} s", seconds=ceil(left)),
                 retry_after_s=ceil(left),
             )
-        given, found = _hash(token), None
+        given, matching = _hash(token), None
         for role, known in self._hashes:  # always all of them: the duration must not depend on the match
             if hmac.compare_digest(given, known):
-                found = role
-        if found is not None:
+                matching = role
+        if matching is not None:
             self._wrong.pop(address, None)
-            return found
+            return matching
         self.refused += 1
         pause = 0.0 if count + 1 < _FREE_TRIES else min(2.0 ** (count + 1 - _FREE_TRIES), _PAUSE_S_MAX)
         self._wrong[address] = count + 1, self._clock() + pause
@@ -163,10 +163,10 @@ def _hash(text: str) -> bytes:
 
 def _session(cookie: str) -> str:
     try:
-        found = SimpleCookie(cookie).get(COOKIE)
+        morsel = SimpleCookie(cookie).get(COOKIE)
     except CookieError:
         return ""
-    return "" if found is None else found.value
+    return "" if morsel is None else morsel.value
 
 
 def network(address: str) -> str:

@@ -1,13 +1,14 @@
-"""The state of one alarm, as ISA 18.2 and IEC 62682 name the states."""
+"""The state of one alarm, as ISA 18.2 and IEC 62682 name the states, and the history of all."""
 
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from math import isfinite
 from typing import Any, Literal
 
 from livebode.core import Event
+from livebode.language import for_page
 from livebode.monitoring import AlarmKind
 
 Condition = Literal["unacknowledged", "acknowledged", "returned", "normal"]
@@ -84,7 +85,7 @@ class AlarmStatus:
         self.active, self.returned_s = False, time_s
 
     def acknowledge(self, event: Event) -> None:
-        """It is acknowledged by this event."""
+        """Acknowledge the alarm by this event."""
         self.by, self.comment = text_in(event, "by"), text_in(event, "comment")
         if self.active and self.kind.end == "acknowledged":
             self.end_at(event.time_s)
@@ -102,7 +103,7 @@ class AlarmStatus:
         return self._times[0] + CHATTER_S if full and self._times[-1] - self._times[0] <= CHATTER_S else None
 
     def chatters_at(self, time_s: float) -> bool:
-        """Whether it chatters at this time of the run."""
+        """Whether the alarm chatters at this time of the run."""
         until_s = self.chatters_until_s
         return until_s is not None and time_s <= until_s
 
@@ -123,11 +124,11 @@ _NUMBER_MAX = 1e15
 
 def _facts(details: dict[str, Any]) -> dict[str, Any]:
     """What the first look needs; of a change at several lines or parameters, the most significant one."""
-    found = {name: details.get(name) for name in _FACTS}
+    facts = {name: details.get(name) for name in _FACTS}
     changes = details.get("changes")
     if isinstance(changes, list) and changes and isinstance(changes[0], dict):
-        found |= {name: changes[0].get(name) for name in _ITEM}
-    return {name: value for name, value in found.items() if _plain(value)}
+        facts |= {name: changes[0].get(name) for name in _ITEM}
+    return {name: value for name, value in facts.items() if _plain(value)}
 
 
 def _plain(value: object) -> bool:
@@ -148,3 +149,92 @@ def number_in(event: Event, name: str) -> float | None:
     if isinstance(value, bool) or not isinstance(value, int | float):
         return None
     return float(value) if abs(value) < _NUMBER_MAX else None
+
+
+What = Literal[
+    "raised", "returned", "acknowledged", "shelved", "unshelved", "suppressed", "unsuppressed", "chattering"
+]  # fmt: skip
+ROWS_MAX = 1000
+_MESSAGE_MAX = 400
+
+
+@dataclass(frozen=True)
+class Transition:
+    """One change of an alarm.
+
+    Attributes
+    ----------
+    number, version
+        Of the row, and of its last change.
+    time_s
+        Time of the run.
+    cause, kind, words
+        Of the alarm, and of the event that caused the change.
+    what
+        What happened.
+    state
+        State of the alarm after it.
+    by, comment
+        Person, and what they wrote.
+    count
+        Number of events: more than one where a chattering alarm, or a flood, is one row.
+    """
+
+    number: int
+    version: int
+    time_s: float
+    cause: str
+    kind: str
+    words: str
+    what: What
+    state: str
+    by: str = ""
+    comment: str = ""
+    count: int = 1
+
+
+def limited(message: str, letters: int) -> str:
+    """The message, or the beginning of its text if it is longer."""
+    return message if len(message) <= letters else message[:letters]
+
+
+class AlarmHistory:
+    """The newest transitions, oldest first. While an alarm chatters, all its transitions share a row."""
+
+    def __init__(self) -> None:
+        self._rows: deque[Transition] = deque(maxlen=ROWS_MAX)
+        self._numbered = 0
+        self._chattering: dict[str, int] = {}  # number of the row of each chattering cause
+
+    def add(self, version: int, what: What, time_s: float, chatters: bool = False, **facts: Any) -> None:
+        """Add a transition; `chatters`: of an alarm that chatters."""
+        cause = facts["cause"]
+        if not chatters:
+            self._chattering.pop(cause, None)
+        index = self._place(self._chattering.get(cause)) if chatters else None
+        count = facts.pop("count", 1)
+        facts["words"] = limited(facts["words"], _MESSAGE_MAX)
+        if index is not None:
+            known = self._rows[index]
+            count = known.count + (count if what == "raised" else 0)
+            self._rows[index] = replace(known, version=version, time_s=time_s, count=count, **facts)
+            return
+        self._numbered += 1
+        if chatters:
+            what = "chattering"
+            self._chattering[cause] = self._numbered
+        self._rows.append(Transition(self._numbered, version, time_s, what=what, count=count, **facts))
+
+    def since(self, version: int) -> list[dict[str, Any]]:
+        """Rows that are new or changed after `version`, oldest first."""
+        return [
+            asdict(row) | {"message": str(row.words), "words": for_page(row.words)}
+            for row in self._rows
+            if row.version > version
+        ]
+
+    def _place(self, number: int | None) -> int | None:
+        """Index of a row that is still there."""
+        if number is None or not self._rows or number < self._rows[0].number:
+            return None
+        return number - self._rows[0].number

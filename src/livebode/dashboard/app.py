@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -18,21 +19,19 @@ from livebode import export
 from livebode.core import LivebodeError, RecordError, Responses, ServerError, remove_created
 from livebode.dashboard import queries
 from livebode.dashboard.access import COOKIE, SESSION_S, error_answer
-from livebode.dashboard.admission import serve_browser
 from livebode.dashboard.alarm_requests import Act, alarm_request
 from livebode.dashboard.board import Board
-from livebode.dashboard.client import Client
+from livebode.dashboard.browser_socket import Client, serve_browser
 from livebode.dashboard.frames import frame
 from livebode.dashboard.guard import Guard, body
-from livebode.dashboard.matrix_answer import matrix_answer
+from livebode.dashboard.matrix_group import matrix_answer
 from livebode.dashboard.past import Past
-from livebode.dashboard.plugin_pages import PluginPages
+from livebode.dashboard.plugin_pages import Answer, PluginPages, ShownRun, files_of_additions, page_additions
 from livebode.dashboard.queries import SavedChange
 from livebode.dashboard.runs_pages import RunsPages
-from livebode.dashboard.server_settings import Serving
+from livebode.dashboard.server_settings import ServerSettings
 from livebode.dashboard.signals import signals
 from livebode.dashboard.state import State
-from livebode.dashboard.trials import loop_trials
 from livebode.language import Message, catalogue_for_page, negotiated
 from livebode.plugins import loaded
 from livebode.records import SavedCurves, change_saved, read_saved
@@ -41,22 +40,22 @@ from livebode.records import SavedCurves, change_saved, read_saved
 def listed(saved: SavedCurves) -> dict[str, Any]:
     """Names and times for the page; the curves themselves are sent as frames."""
     references = [
-        {"id": one.id, "name": one.name, "saved": one.saved, "time_s": float(one.response.time_s[0])}
-        for one in saved.references
+        {"id": item.id, "name": item.name, "saved": item.saved, "time_s": float(item.response.time_s[0])}
+        for item in saved.references
     ]
-    return {"references": references, "annotations": [vars(one) for one in saved.annotations]}
+    return {"references": references, "annotations": [vars(item) for item in saved.annotations]}
 
 
 def applied(change: SavedChange, past: Past, state: State) -> Callable[[SavedCurves], SavedCurves]:
     """The change as a function; it reads the record, so it is called in another thread."""
     if change.kind == "annotation":
-        return lambda saved: saved.with_annotation(change.text, change.at)
+        return lambda saved: saved.with_annotation(change.text, change.value)
     if change.kind == "remove":
         return lambda saved: saved.without(change.text)
     quantities = state.quantities
 
     def add(saved: SavedCurves) -> SavedCurves:
-        response = past.at(change.at)
+        response = past.at(change.value)
         if quantities is None or not quantities.fit(response):
             raise ServerError("not-begun", "the response belongs to a previous run", "choose one of this run")
         return saved.with_reference(change.text, response)
@@ -70,7 +69,7 @@ _TYPES = {"csv": "text/csv; charset=utf-8", "mat": "application/octet-stream"}
 
 
 def application(
-    board: Board, serving: Serving, directory: Path | None = None, others: PluginPages | None = None
+    board: Board, serving: ServerSettings, directory: Path | None = None, others: PluginPages | None = None
 ) -> Guard:
     """The ASGI application: the page of the board, of a plug-in, or of all runs of a directory, each with a board."""
     pages = _Pages(board, serving, _files(others))
@@ -89,7 +88,7 @@ def application(
         routes += RunsPages(
             directory,
             board,
-            lambda one: _app(_page_routes(_Pages(one, serving, pages.files))),
+            lambda board: _app(_page_routes(_Pages(board, serving, pages.files))),
             pages.file,
             serving.language,
         ).routes
@@ -107,8 +106,6 @@ def _page_routes(pages: _Pages) -> list[BaseRoute]:
         Route("/api/past", pages.past),
         Route("/api/moment", pages.moment),
         Route("/api/signals", pages.signals),
-        Route("/api/loop", pages.loop),
-        Route("/api/steps", pages.steps),
         Route("/api/matrix", pages.matrix),
         Route("/api/export", pages.export),
         Route("/api/acknowledge", pages.acknowledge, methods=["POST"]),
@@ -117,16 +114,16 @@ def _page_routes(pages: _Pages) -> list[BaseRoute]:
         Route("/api/saved", pages.saved, methods=["GET"]),
         Route("/api/saved", pages.change_saved, methods=["POST"]),
         WebSocketRoute("/live", pages.live),
+        *pages.routes_of_additions(),
     ]
 
 
 class _Pages:
     """The handlers of the routes."""
 
-    def __init__(self, board: Board, serving: Serving, files: dict[str, tuple[bytes, str]]) -> None:
+    def __init__(self, board: Board, serving: ServerSettings, files: dict[str, tuple[bytes, str]]) -> None:
         self._board, self._secure, self._language = board, serving.tls is not None, serving.language
         self.files = files
-        self._trials = loop_trials()
 
     async def page(self, request: Request) -> Response:
         if self._role(request) is None:
@@ -170,16 +167,16 @@ class _Pages:
         if (state := self._asked_state(request)) is None:
             return _unknown()
         span, past = queries.span(request.query_params, len(self._board.states)), Past.of(state)
-        found = await self._board.elsewhere(past.between, span.from_s, span.to_s, span.rows)
-        return Response(frame("history", span.axis, _as(state, found, span)), media_type="application/octet-stream")
+        rows = await self._board.elsewhere(past.between, span.from_s, span.to_s, span.rows)
+        return Response(frame("history", span.axis, _as(state, rows, span)), media_type="application/octet-stream")
 
     async def moment(self, request: Request) -> Response:
         """The response nearest to a time, with its overlays."""
         if (state := self._asked_state(request)) is None:
             return _unknown()
         span = queries.span(request.query_params, len(self._board.states))
-        found = await self._board.elsewhere(Past.of(state).at, span.from_s)
-        data = state.frames_of("moment", found, span.quantity)
+        response = await self._board.elsewhere(Past.of(state).at, span.from_s)
+        data = state.frames_of("moment", response, span.quantity)
         return Response(data, media_type="application/octet-stream")
 
     async def signals(self, request: Request) -> Response:
@@ -187,22 +184,20 @@ class _Pages:
         if self._role(request) is None:
             return _unknown()
         asked = queries.signals_asked(request.query_params, len(self._board.states))
-        found = await signals(self._board, self._begun(asked.axis), asked)
-        return Response(found, media_type="application/octet-stream")
+        answer = await signals(self._board, self._begun(asked.axis), asked)
+        return Response(answer, media_type="application/octet-stream")
 
-    async def loop(self, request: Request) -> Response:
-        """The controllers and the plant with its bounds, from which the page computes other gains and filters."""
+    def routes_of_additions(self) -> list[BaseRoute]:
+        """The requests that the additions of the page answer, from one object of each for this board."""
+        answers = {name: answer for kind in page_additions().values() for name, answer in kind().answers().items()}
+        return [Route(f"/api/{name}", partial(self._addition, answer)) for name, answer in answers.items()]
+
+    async def _addition(self, answer: Answer, request: Request) -> Response:
         if (state := self._asked_state(request)) is None:
             return _unknown()
-        job, asked = self._trials.facts, (state.axis, Past.of(state), state.quantities, dict(state.summary))
-        return JSONResponse(await self._board.elsewhere(job, *asked))
-
-    async def steps(self, request: Request) -> Response:
-        """Steps and torque noise of the described loop and of the gains and filters that a person tries."""
-        if (state := self._asked_state(request)) is None:
-            return _unknown()
-        job, text = self._trials.steps, request.query_params.get("trial", "")
-        return JSONResponse(await self._board.elsewhere(job, state.axis, Past.of(state), state.quantities, text))
+        assert state.quantities is not None  # the run has begun
+        run = ShownRun(state.axis, Past.of(state), state.quantities, dict(state.summary))
+        return JSONResponse(await self._board.elsewhere(answer, run, request.query_params))
 
     async def matrix(self, request: Request) -> Response:
         """The newest matrix of the run that an axis is an entry of, or the one nearest to a time."""
@@ -211,9 +206,9 @@ class _Pages:
         group, time_s = state.group, queries.moment(request.query_params)
         if group is None:
             raise RecordError("no-matrix", "this run has one response and no matrix", Message("reload the page"))
-        found = await self._board.elsewhere(group.at, _directory(state), state.readable, time_s)
+        responses = await self._board.elsewhere(group.at, _directory(state), state.readable, time_s)
         units = [[_unit(self._board.states[group.axis(o, i)]) for i in group.inputs] for o in group.outputs]
-        return JSONResponse(matrix_answer(group, found, units))
+        return JSONResponse(matrix_answer(group, responses, units))
 
     async def export(self, request: Request) -> Response:
         """Responses of a span of time as a file; a single response if the span has no length."""
@@ -321,13 +316,12 @@ class _Pages:
 
 def _files(others: PluginPages | None) -> dict[str, tuple[bytes, str]]:
     """Content and type of the static files, in memory: reading a file would take a thread for each request."""
-    found = {}
     folders = [(_HERE / "static", ""), (_HERE / "_vendor" / "uplot", "uplot/")]
-    for folder, prefix in folders if others is None else [*folders, (others.static, "")]:
-        for path in folder.iterdir():
-            if kind := _FILE_TYPES.get(path.suffix):
-                found[prefix + path.name] = path.read_bytes(), kind
-    return found
+    if others is not None:
+        folders.append((others.static, ""))
+    files = {prefix + path.name: path.read_bytes() for folder, prefix in folders for path in folder.iterdir()}
+    files |= files_of_additions()
+    return {name: (content, kind) for name, content in files.items() if (kind := _FILE_TYPES.get(Path(name).suffix))}
 
 
 def _as(state: State, responses: Responses, span: queries.Span) -> Responses:

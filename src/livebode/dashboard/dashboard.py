@@ -15,11 +15,9 @@ from typing import TYPE_CHECKING, Any, Self
 from livebode.core import RecordError, ServerError, not_installed
 from livebode.dashboard.access import Access
 from livebode.dashboard.hub import Hub
-from livebode.dashboard.matrix_group import MatrixGroup
-from livebode.dashboard.matrix_hub import MatrixHub
-from livebode.dashboard.matrix_view import views_of
-from livebode.dashboard.run_feed import RunFeed
-from livebode.dashboard.server_settings import Serving
+from livebode.dashboard.matrix_group import MatrixGroup, MatrixHub
+from livebode.dashboard.run_feed import RunFeed, views_of
+from livebode.dashboard.server_settings import ServerSettings
 from livebode.dashboard.state import State
 
 if TYPE_CHECKING:
@@ -54,7 +52,7 @@ class Dashboard:
         On entering, if the packages of the extra `dashboard` are missing.
     """
 
-    def __init__(self, serving: Serving, report: Callable[[str], None] = lambda _: None) -> None:
+    def __init__(self, serving: ServerSettings, report: Callable[[str], None] = lambda _: None) -> None:
         self._serving, self._hears = serving, report
         self._states: list[State] = []
         self._viewed: dict[int, RunFeed] = {}
@@ -80,12 +78,12 @@ class Dashboard:
         return hub
 
     def _of_matrix(self, name: str, entries: Sequence[tuple[str, str]]) -> MatrixHub:
-        """Its entries are in order, output by output."""
+        """Hub of a matrix run, whose entries are in order, output by output."""
         hub = MatrixHub(name, list(entries))
         outputs, inputs = (tuple(dict.fromkeys(entry[k] for entry in entries)) for k in (0, 1))
         group = MatrixGroup(name, outputs, inputs, len(self._states), hub.newest)
-        for (output, input), one in hub.hubs.items():
-            state = State(one.name, len(self._states), one)
+        for (output, input), entry_hub in hub.hubs.items():
+            state = State(entry_hub.name, len(self._states), entry_hub)
             state.group, state.entry = group, f"{output}/{input}"
             self._states.append(state)
         return hub
@@ -138,7 +136,7 @@ class Dashboard:
         try:
             import uvicorn
 
-            from livebode.dashboard.patience import IDLE_S, PatientProtocol
+            from livebode.dashboard.listener import IDLE_S, PatientProtocol
             from livebode.dashboard.server import Server, WebSocketProtocol
         except ImportError as error:
             raise not_installed(
@@ -233,18 +231,18 @@ class Dashboard:
             self._faults.report(error)
 
 
-def listening(serving: Serving) -> socket.socket:
+def listening(serving: ServerSettings) -> socket.socket:
     """A socket that listens where the dashboard is to be."""
     family = socket.AF_INET6 if ":" in serving.address else socket.AF_INET
-    found = socket.socket(family, socket.SOCK_STREAM)
+    server = socket.socket(family, socket.SOCK_STREAM)
     try:
-        found.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        found.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, UNREAD_BYTES)  # accepted connections inherit it
-        found.bind((serving.address, serving.port))
-        found.listen(BACKLOG)
-        found.setblocking(False)
+        server.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        server.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, UNREAD_BYTES)  # accepted connections inherit it
+        server.bind((serving.address, serving.port))
+        server.listen(BACKLOG)
+        server.setblocking(False)
     except OSError as error:
-        found.close()
+        server.close()
         if error.errno == errno.EADDRINUSE:
             raise ServerError(
                 "port-taken",
@@ -262,4 +260,4 @@ def listening(serving: Serving) -> socket.socket:
             port=serving.port,
             errno=error.errno,
         ) from None
-    return found
+    return server

@@ -70,9 +70,9 @@ def curve(kind: str, axis: int, quantity: Quantity, time_s: float, value: np.nda
         magnitude = 20 * np.log10(np.abs(value))
     phase = unwrapped(np.degrees(np.angle(value)), np.zeros(len(value), dtype=bool))
     nothing = np.full(len(value), np.nan)
-    one = np.array([np.nan])
+    unknown = np.array([np.nan])
     head = header(kind, axis, quantity, 1, len(value))
-    return _packed(head, (np.array([time_s]), one, one), (magnitude, phase, nothing, nothing, nothing))
+    return _packed(head, (np.array([time_s]), unknown, unknown), (magnitude, phase, nothing, nothing, nothing))
 
 
 def header(kind: str, axis: int, quantity: Quantity, rows: int, columns: int) -> bytes:

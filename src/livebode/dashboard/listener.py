@@ -10,10 +10,99 @@ import ssl
 import sys
 from collections import Counter, deque
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
+import h11
+from starlette.types import Receive, Scope, Send
+from uvicorn.protocols.http.h11_impl import H11Protocol
+
 from livebode.dashboard.access import network
-from livebode.dashboard.patience import ClientWait, PatientProtocol
+
+REQUEST_S = 10.0
+"""Limit for a complete request, head and body, from the connection or its first byte."""
+IDLE_S = 30.0
+"""Limit between two requests."""
+UNREAD_S = 20.0
+"""Limit without reading any part of an answer."""
+
+
+@dataclass(frozen=True)
+class ClientWait:
+    """How long a connection waits for the client.
+
+    Attributes
+    ----------
+    since_s
+        Start of the wait, by the loop's clock.
+    limit_s
+        Time limit of the client to send a request or to read its answer; None if it waits for the server or has a web
+        socket, and must not be closed.
+    """
+
+    since_s: float
+    limit_s: float | None
+
+    def over(self, now_s: float) -> bool:
+        """Whether the client exceeded its limit."""
+        return self.limit_s is not None and now_s - self.since_s > self.limit_s
+
+
+class PatientProtocol(H11Protocol):
+    """`waits` reports what the client must do: send a request or the rest of one, or read its answer."""
+
+    _since_s = _unread_s = 0.0
+    _idle = _upgraded = _working = False
+    heard = False
+    """Whether anything that the client has sent was read."""
+
+    async def _call(self, scope: Scope, receive: Receive, send: Send) -> None:
+        self._working = True
+        try:
+            await self.config.loaded_app(scope, receive, send)
+        finally:
+            self._working = False
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+        super().connection_made(transport)
+        self._since_s, self.app = self.loop.time(), self._call
+
+    def data_received(self, data: bytes) -> None:
+        self.heard = True
+        if self._idle:
+            self._since_s, self._idle = self.loop.time(), False
+        super().data_received(data)
+
+    def on_response_complete(self) -> None:
+        self._since_s, self._idle = self.loop.time(), True
+        super().on_response_complete()
+
+    def pause_writing(self) -> None:
+        self._unread_s = self.loop.time()
+        super().pause_writing()
+
+    def handle_websocket_upgrade(self, event: h11.Request) -> None:
+        self._upgraded = True  # the transport now belongs to another protocol, which has its own limits
+        super().handle_websocket_upgrade(event)
+
+    @property
+    def answers(self) -> bool:
+        """Whether the server works on an answer: the request is complete, and the client reads or has gone."""
+        asked: object = self.cycle  # None before the first request, which uvicorn's type omits
+        if asked is None or self._upgraded or self.flow.write_paused or self.cycle.response_complete:
+            return False
+        return self._working if self.cycle.disconnected else not self.cycle.more_body
+
+    @property
+    def waits(self) -> ClientWait:
+        if self._upgraded:  # the web socket has its own limits
+            return ClientWait(self._since_s, None)
+        if self.flow.write_paused:
+            return ClientWait(self._unread_s, UNREAD_S)
+        if self.answers:
+            return ClientWait(self._since_s, None)
+        return ClientWait(self._since_s, IDLE_S if self._idle else REQUEST_S)
+
 
 CONNECTIONS_MAX = 128
 HANDSHAKE_S = 10.0
@@ -21,7 +110,7 @@ HANDSHAKE_S = 10.0
 _DESCRIPTORS_PER_CONNECTION = 4  # the connection and a file that it receives; as many are reserved for the record
 _SWEEP_S = 1.0
 _SENTENCE_S = 60.0
-_REST_S = 0.2
+_REST_S = 0.2  # where accepting fails for want of descriptors, an immediate retry fails too
 _Accepted = tuple[socket.socket, Any]
 _ROUND = 8
 """Connections that are taken at once, so that all their requests are read: more than a browser opens."""
@@ -53,7 +142,7 @@ class _Connection:
     def __init__(self, taken: socket.socket, address: str, since_s: float) -> None:
         self.socket, self.address, self.since_s = taken, address, since_s
         self.asks = False
-        """Whether it has sent something."""
+        """Whether the client has sent something."""
         self.protocol: PatientProtocol | None = None  # known after the TLS handshake
         self.serving: asyncio.Task[None] | None = None
 
@@ -67,7 +156,7 @@ class _Connection:
 
     @property
     def unread(self) -> bool:
-        """Whether it has sent something, and nothing of it was read."""
+        """Whether the client has sent something, and nothing of it was read."""
         return self.asks and (self.protocol is None or not self.protocol.heard)
 
     @property
@@ -141,7 +230,7 @@ class Listener:
                     crowded_s = loop.time()
                 accepted = self._accepted(first, all_of_them=loop.time() - crowded_s > _QUEUE_S)
                 self._crowded = len(accepted) >= _ROUND
-                self._take(accepted)
+                self._add(accepted)
                 # Else the next ones would take the places of these before their requests are read.
                 await asyncio.sleep(0)  # until `_ask` has been called for them
                 with contextlib.suppress(TimeoutError):
@@ -173,8 +262,8 @@ class Listener:
             kept.append((taken, address))
         return kept
 
-    def _take(self, accepted: Sequence[_Accepted]) -> None:
-        """Take connections, and close others, or some of them, where there are too many."""
+    def _add(self, accepted: Sequence[_Accepted]) -> None:
+        """Add connections, and close others, or some of them, where there are too many."""
         loop = asyncio.get_running_loop()
         self._left = [connection for connection in self._left + self._connections if connection.left_work]
         self._connections = [connection for connection in self._connections if connection.open]
@@ -240,9 +329,11 @@ class Listener:
         """The newest connection that asks, of an address for which the server does not work on enough requests."""
         self._asking = [connection for connection in self._asking if connection.open]
         working = Counter(
-            one.address
-            for one in (*self._connections, *self._left)
-            if one.protocol is not None and one.protocol.answers and now_s - one.protocol.waits.since_s < _LONG_S
+            connection.address
+            for connection in (*self._connections, *self._left)
+            if connection.protocol is not None
+            and connection.protocol.answers
+            and now_s - connection.protocol.waits.since_s < _LONG_S
         )
         for index in reversed(range(len(self._asking))):
             if working[self._asking[index].address] < _AT_ONCE:

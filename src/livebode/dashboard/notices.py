@@ -10,8 +10,17 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from livebode.core import Event
-from livebode.dashboard.alarm import OPEN, AlarmShelf, AlarmState, AlarmStatus, number_in, text_in
-from livebode.dashboard.alarm_history import AlarmHistory, What, limited
+from livebode.dashboard.alarm import (
+    OPEN,
+    AlarmHistory,
+    AlarmShelf,
+    AlarmState,
+    AlarmStatus,
+    What,
+    limited,
+    number_in,
+    text_in,
+)
 from livebode.language import for_page
 from livebode.monitoring import ALARMS, FAR, PRIORITIES, RETURNS, SOURCE, UNMONITORED, cause_of
 from livebode.records import each_event, event_counts, group_of
@@ -102,8 +111,8 @@ class EventCauses:
     @property
     def changed(self) -> set[str]:
         """Names of the active differences from the baseline."""
-        alarms = [one.alarm for one in self._shown.values() if one.cause.partition(":")[0] == "change"]
-        return {str(one.facts.get("what", "machine")) for one in alarms if one is not None and one.active}
+        alarms = [shown.alarm for shown in self._shown.values() if shown.cause.partition(":")[0] == "change"]
+        return {str(alarm.facts.get("what", "machine")) for alarm in alarms if alarm is not None and alarm.active}
 
     def add(self, event: Event) -> None:
         """Add an event, or an action of a person."""
@@ -113,8 +122,8 @@ class EventCauses:
         elif event.kind in (SHELVED, UNSHELVED):
             self._shelve(event)
         else:
-            for one, times in self._new(event):
-                self._add(one, times, event)
+            for single, times in self._new(event):
+                self._add(single, times, event)
 
     def of(self, key: str) -> tuple[Notice, int] | None:
         """The notice of an event, and the number of the event in it."""
@@ -139,8 +148,8 @@ class EventCauses:
 
     def shelf(self, cause: str) -> AlarmShelf | None:
         """The shelf of a cause until its time has passed."""
-        found = self.shelves.get(cause)
-        return found if found is not None and self._clock() < found.until_s else None
+        shelf = self.shelves.get(cause)
+        return shelf if shelf is not None and self._clock() < shelf.until_s else None
 
     def expired(self) -> list[str]:
         """Causes whose shelf has ended by itself, until that is recorded."""
@@ -159,7 +168,7 @@ class EventCauses:
 
     def forgotten(self, version: int) -> list[str]:
         """Causes that were forgotten after `version`."""
-        return [cause for at, cause in self._forgotten if at > version]
+        return [cause for number, cause in self._forgotten if number > version]
 
     def _plain(self, notice: Notice) -> dict[str, Any]:
         if notice.alarm is None:
@@ -183,15 +192,15 @@ class EventCauses:
             self._groups.popitem(last=False)
         each = list(each_event(event))
         counted = event_counts(event)
-        counted.subtract(one.kind for one in each)
-        found, left = [(one, 1) for one in each[-new:]], new - len(each)
+        counted.subtract(line.kind for line in each)
+        events, left = [(line, 1) for line in each[-new:]], new - len(each)
         for kind, number in counted.items():
             if (times := min(number, left)) > 0:
-                found.insert(0, (Event(kind, event.sample, event.time_s, event.message, {}), times))
+                events.insert(0, (Event(kind, event.sample, event.time_s, event.message, {}), times))
                 left -= times
         if left > 0:  # of lines that never arrived
-            found[-1] = found[-1][0], 1 + left
-        return found
+            events[-1] = events[-1][0], 1 + left
+        return events
 
     def _add(self, event: Event, times: int, line: Event) -> None:
         cause = self._cause(event, line)
@@ -272,8 +281,8 @@ class EventCauses:
             self._touch(notice)
 
     def _acknowledge(self, event: Event) -> None:
-        found = self.of(str(event.details.get("event")))
-        notice = self._shown.get(str(event.details.get("cause"))) if found is None else found[0]
+        noticed = self.of(str(event.details.get("event")))
+        notice = self._shown.get(str(event.details.get("cause"))) if noticed is None else noticed[0]
         if notice is None:
             return
         count, alarm = event.details.get("count"), notice.alarm
@@ -295,10 +304,10 @@ class EventCauses:
             self._log(notice, "shelved" if event.kind == SHELVED else "unshelved", event)
             self._touch(notice, newest=False)
 
-    def _log(self, notice: Notice, what: What, event: Event, times: int = 1) -> None:
+    def _log(self, notice: Notice, change: What, event: Event, times: int = 1) -> None:
         alarm = notice.alarm
-        chatters = alarm is not None and what in ("raised", "returned") and alarm.chatters_at(event.time_s)
-        acted = what not in ("raised", "returned")
+        chatters = alarm is not None and change in ("raised", "returned") and alarm.chatters_at(event.time_s)
+        acted = change not in ("raised", "returned")
         facts = {
             "cause": notice.cause,
             "kind": notice.kind if acted else event.kind,
@@ -308,7 +317,7 @@ class EventCauses:
             "comment": text_in(event, "comment") or text_in(event, "reason"),
             "count": times,
         }
-        self.history.add(self.version, what, event.time_s, chatters=chatters, **facts)
+        self.history.add(self.version, change, event.time_s, chatters=chatters, **facts)
 
     def _touch(self, notice: Notice, *, newest: bool = True) -> None:
         notice.changed = self.version

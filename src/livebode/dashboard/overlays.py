@@ -14,7 +14,7 @@ from livebode.arrays import Floats
 from livebode.configuration import FitSection, chosen_model, recorded_configuration
 from livebode.core import Lines, LivebodeError, Quantity, Responses
 from livebode.dashboard.quantities import Quantities
-from livebode.dashboard.trends import Trends
+from livebode.dashboard.recent import Trends
 from livebode.estimates import MATRIX, rule
 from livebode.fitting import EvaluationGrid, PhysicalModel
 from livebode.language import Message
@@ -50,10 +50,10 @@ class FittedCurve:
 
     def curve(self, trends: Trends, quantity: Quantity, time_s: float | None) -> tuple[float, Any] | None:
         """Time and values on the grid of the newest valid fit, or of the valid fit nearest to a time."""
-        found = self._parameters(trends, time_s)
-        if found is None:
+        fitted = self._parameters(trends, time_s)
+        if fitted is None:
             return None
-        at_s, values = found
+        at_s, values = fitted
         plant = self.model.at(values, self._grid)
         if quantity == "plant":
             return at_s, plant
@@ -66,14 +66,14 @@ class FittedCurve:
 
     def _parameters(self, trends: Trends, time_s: float | None) -> tuple[float, Floats] | None:
         """Time and values of one valid fit."""
-        found = trends.values(self.model.name, self.model.names, whole=time_s is not None)
-        if found is None:
+        values_of_time = trends.values(self.model.name, self.model.names, whole=time_s is not None)
+        if values_of_time is None:
             return None
-        at_s, values = found
+        at_s, values = values_of_time
         good = np.flatnonzero(np.isfinite(values).all(axis=1))
         if time_s is not None and good.size:
-            at = good[np.argmin(np.abs(at_s[good] - time_s))]
-            return float(at_s[at]), values[at]
+            nearest = good[np.argmin(np.abs(at_s[good] - time_s))]
+            return float(at_s[nearest]), values[nearest]
         if time_s is None and good.size:
             self._newest = float(at_s[-1]), values[-1]
         return self._newest if time_s is None else None

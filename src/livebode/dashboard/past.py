@@ -15,7 +15,7 @@ from livebode.language import Message
 from livebode.records import RunRecord, thinned
 
 ROWS_MAX = 2000
-_READ_BYTES = 8 << 20
+_READ_BYTES = 8 << 20  # longer spans are shown from the thinned copy in memory
 _WHOLE = 0.95  # of the run: for longer spans the thinned copy in memory is equivalent
 
 
@@ -34,7 +34,7 @@ class Past:
     shown
         The newest responses that were sent to browsers.
     readable
-        Whether the record can be read: a run in one piece can be read only after its end.
+        Whether the record can be read: one without a journal can be read only after its end.
     entry
         Of a matrix run: output and input of the responses, such as "velocity2/u1".
     """
@@ -95,16 +95,18 @@ class Past:
 
     def _recorded(self, from_s: float, to_s: float, rows: int) -> Responses | None:
         run = self.record()
-        within = [one for one in run.segments if one.table == "responses" and from_s <= one.last_s <= to_s]
-        if sum(one.size_bytes for one in within) > _READ_BYTES:
+        within = [
+            segment for segment in run.segments if segment.table == "responses" and from_s <= segment.last_s <= to_s
+        ]
+        if sum(segment.size_bytes for segment in within) > _READ_BYTES:
             means = thinned(run, (to_s - from_s) / max(1, rows - 1), (from_s, to_s))
             if means is not None:
                 return means
-        found, number = Overview(), 0
+        overview, number = Overview(), 0
         for part in run.between(from_s, to_s):
-            found.add(part)
+            overview.add(part)
             number += len(part)
-        return found.responses() if number else None
+        return overview.responses() if number else None
 
     def all_between(self, from_s: float, to_s: float) -> Iterator[Responses]:
         """All responses of a span, in parts: from the record if it can be read, otherwise those in memory."""
@@ -117,11 +119,11 @@ class Past:
 
     def at(self, time_s: float) -> Responses:
         """The response with a valid line nearest to a time, one row, from the most exact source."""
-        found = [part for part in (*self.shown, self.recent, self.overview) if part is not None]
+        parts = [part for part in (*self.shown, self.recent, self.overview) if part is not None]
         if self.readable and self.overview is not None:
             reach_s = 2 * self.overview.lines.window / self.overview.lines.rate_hz
-            found += self.record().between(time_s - reach_s, time_s + reach_s)
-        best = _nearest(found, time_s)
+            parts += self.record().between(time_s - reach_s, time_s + reach_s)
+        best = _nearest(parts, time_s)
         if best is None:
             raise ServerError(
                 "not-begun", Message("no response has a valid line yet"), Message("wait for the first window")
@@ -134,10 +136,10 @@ def _thinned(responses: Responses, rows: int) -> Responses:
 
 
 def _nearest(parts: list[Responses], time_s: float) -> Responses | None:
-    found: list[Responses] = []
+    candidates: list[Responses] = []
     for part in parts:
         use = np.flatnonzero(part.valid.any(axis=1))
         if use.size:
-            at = int(use[np.argmin(np.abs(part.time_s[use] - time_s))])
-            found.append(part[at : at + 1])
-    return min(found, key=lambda one: abs(float(one.time_s[0]) - time_s), default=None)
+            row = int(use[np.argmin(np.abs(part.time_s[use] - time_s))])
+            candidates.append(part[row : row + 1])
+    return min(candidates, key=lambda candidate: abs(float(candidate.time_s[0]) - time_s), default=None)

@@ -1,10 +1,12 @@
-"""PluginPages: what a dashboard shows instead of axes."""
+"""What plug-ins show: pages instead of axes, and parts of the page of a run."""
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+
+from livebode.plugins import loaded, named
 
 if TYPE_CHECKING:
     from starlette.requests import Request
@@ -12,6 +14,8 @@ if TYPE_CHECKING:
     from starlette.routing import BaseRoute
 
     from livebode.dashboard.board import Board
+    from livebode.dashboard.past import Past
+    from livebode.dashboard.quantities import Quantities
 
 Order = Callable[["Request"], Awaitable["bytes | Response"]]
 
@@ -38,3 +42,49 @@ class PluginPages(Protocol):
 
     async def run(self) -> None:
         """Update what the pages show until it is cancelled, in the thread of the server."""
+
+
+class ShownRun(NamedTuple):
+    """The run of an axis of the page: its record, its quantities, and the run.json that it has or will have."""
+
+    axis: int
+    past: Past
+    quantities: Quantities
+    summary: dict[str, Any]
+
+
+Answer = Callable[[ShownRun, Mapping[str, str]], dict[str, Any]]
+"""Plain data for the page, from run and parameters of the request; called in the reading thread of the board."""
+
+
+class PageAddition(Protocol):
+    """What a plug-in adds to the page of a run; constructed without arguments, for each board.
+
+    Attributes
+    ----------
+    static
+        Directory of scripts and styles, which are served beside those of the page; the page has all its styles.
+    script
+        File there that exports `addition`, an `Addition` of messages.d.ts.
+    """
+
+    static: Path
+    script: str
+
+    def answers(self) -> Mapping[str, Answer]:
+        """The answers by name: `GET /api/NAME?axis=0`."""
+
+
+def page_additions() -> dict[str, type[PageAddition]]:
+    """The additions of all plug-ins by name."""
+    return {name: loaded(reference) for name, reference in named("pages").items()}
+
+
+def files_of_additions() -> dict[str, bytes]:
+    """Their static files, with the script that names them to the page, and their styles as one file."""
+    additions = page_additions()
+    files = {path.name: path.read_bytes() for one in additions.values() for path in sorted(one.static.iterdir())}
+    imports = [f'import {{ addition as {name} }} from "./{one.script}";' for name, one in additions.items()]
+    script = "\n".join([*imports, f"export const ADDITIONS = {{ {', '.join(additions)} }};", ""])
+    styles = b"".join(content for name, content in files.items() if name.endswith(".css"))
+    return files | {"additions.js": script.encode(), "additions.css": styles}

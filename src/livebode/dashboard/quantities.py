@@ -54,13 +54,13 @@ class Quantities:
     @classmethod
     def of(cls, summary: Mapping[str, Any]) -> Quantities:
         """Build it from run.json."""
-        found = summary["found"]
-        lines = lines_in(found)
+        settings = summary["found"]
+        lines = lines_in(settings)
         try:
             loop = recorded_loop(dict(summary)).build(lines.rate_hz)
         except ValueError:  # of livebode or of pydantic
             loop = None
-        return cls(found["quantity"], found["unit"], lines, loop, kinds_in(found))
+        return cls(settings["quantity"], settings["unit"], lines, loop, kinds_in(settings))
 
     @property
     def feedback(self) -> Model | None:
@@ -109,8 +109,8 @@ class Quantities:
         """Values of the run's own quantity as another, and the derivative; shapes (..., lines)."""
         with np.errstate(divide="ignore", invalid="ignore"):
             plant, back = _plant(self.own, value, feedback)
-            found, on = convert(quantity, plant, feedback)
-            return found, on * back
+            result, on = convert(quantity, plant, feedback)
+            return result, on * back
 
     @cached_property
     def _feedback(self) -> Complex:
@@ -138,8 +138,8 @@ def per_seconds(unit: str, power: int) -> str:
     output, input = split_plant_unit(unit)
     behind = f"/({input})" if input else ""
     output = output or unit
-    found = _SECONDS.fullmatch(output)
-    own, exponent = (found[1], int((found[2] or found[3] or "1").translate(_RAISED))) if found else (output, 0)
+    match = _SECONDS.fullmatch(output)
+    own, exponent = (match[1], int((match[2] or match[3] or "1").translate(_RAISED))) if match else (output, 0)
     exponent += power
     if exponent == 0:
         return own + behind

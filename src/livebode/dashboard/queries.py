@@ -69,7 +69,7 @@ class SavedChange:
     axis: int
     kind: str
     text: str = ""
-    at: float = 0.0
+    value: float = 0.0
 
 
 def span(query: Mapping[str, str], axes: int) -> Span:
@@ -211,28 +211,28 @@ def saved_change(data: bytes, axes: int) -> SavedChange:
     name = place[str(kind)]
     if name is None:
         return SavedChange(number, str(kind), text)
-    at = message.get(name)
-    if isinstance(at, bool) or not isinstance(at, int | float):
+    position = message.get(name)
+    if isinstance(position, bool) or not isinstance(position, int | float):
         raise UsageError("unreadable", f"{name} is not a number", "give a number", argument=name)
-    found = _time(str(at)[:40])
-    if kind == "annotation" and found <= 0:
+    value = _time(str(position)[:40])
+    if kind == "annotation" and value <= 0:
         raise UsageError("unreadable", "frequency_hz is not positive", "give a frequency", argument=name)
-    return SavedChange(number, str(kind), text.strip(), found)
+    return SavedChange(number, str(kind), text.strip(), value)
 
 
-def json_object(data: bytes | str, what: str = "body") -> dict[str, Any]:
+def json_object(data: bytes | str, noun: str = "body") -> dict[str, Any]:
     """Parse a JSON object; ServerError if it is invalid, or has half of a letter, which no file and no answer can."""
     try:
         message = json.loads(data)
         json.dumps(message, ensure_ascii=False).encode()
     except UnicodeEncodeError:
         raise ServerError(
-            "request-malformed", f"the {what} has half of a letter (a surrogate)", "remove the letter"
+            "request-malformed", f"the {noun} has half of a letter (a surrogate)", "remove the letter"
         ) from None
     except (ValueError, RecursionError):
-        raise ServerError("request-malformed", f"the {what} is not JSON", "send an object of JSON") from None
+        raise ServerError("request-malformed", f"the {noun} is not JSON", "send an object of JSON") from None
     if not isinstance(message, dict):
-        raise ServerError("request-malformed", f"the {what} is not an object of JSON", "send one")
+        raise ServerError("request-malformed", f"the {noun} is not an object of JSON", "send one")
     return message
 
 

@@ -27,8 +27,10 @@ T = TypeVar("T")
 def runs_in(directory: Path) -> list[str]:
     """Names of the runs in a directory, sorted: no links, and no hidden names."""
     try:
-        with os.scandir(directory) as found:
-            names = [one.name for one in found if not one.name.startswith(".") and one.is_dir(follow_symlinks=False)]
+        with os.scandir(directory) as entries:
+            names = [
+                item.name for item in entries if not item.name.startswith(".") and item.is_dir(follow_symlinks=False)
+            ]
     except OSError as error:
         raise ServerError(
             "run-unknown",
@@ -128,9 +130,9 @@ class RunCatalogue:
             mark = _mark(self.directory / name)
             # A run that grew may have stopped since: nothing of it changes then.
             if not self._rows.known(name, mark) or self._rows.values[name][2].state == "recording":
-                found = entry(self.directory / name)
-                if not self._rows.known(name, mark) or found != self._rows.values[name][2]:
-                    self._rows.put(name, mark, found)
+                row = entry(self.directory / name)
+                if not self._rows.known(name, mark) or row != self._rows.values[name][2]:
+                    self._rows.put(name, mark, row)
         self._rows.retain(set(names))
         self._scanned_s = time.monotonic()
 
@@ -180,11 +182,11 @@ def _read(run: Path, job: Callable[[RunRecord], T], otherwise: T) -> T:
 
 def _mark(run: Path) -> tuple[tuple[int, int, int], ...]:
     """What changes when the run changes."""
-    found = []
+    marks = []
     for name in _WATCHED:
         try:
             known = os.lstat(run / name)
         except OSError:
             continue
-        found.append((known.st_ino, known.st_mtime_ns, known.st_size))
-    return tuple(found)
+        marks.append((known.st_ino, known.st_mtime_ns, known.st_size))
+    return tuple(marks)

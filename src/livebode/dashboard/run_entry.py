@@ -12,11 +12,10 @@ from pathlib import Path
 from typing import Any, Literal
 
 from livebode.core import LEVELS, LivebodeError, RunClock
-from livebode.dashboard.alarm_history import limited
+from livebode.dashboard.alarm import limited
 from livebode.language import for_page, recorded
 from livebode.monitoring import result_tone
-from livebode.records import RUN, Manifest, open_read, read_notes, read_summary, what_is_wrong
-from livebode.tables import read_footer
+from livebode.records import RUN, Manifest, read_notes, read_summary, what_is_wrong
 
 RunState = Literal["finished", "recording", "stopped", "broken"]
 _GROWS_S = 10.0
@@ -101,11 +100,13 @@ def grows(newest: Mapping[str, float]) -> bool:
 
 
 def _readable(run: Path, summary: dict[str, Any], size: int, newest: dict[str, float]) -> RunEntry:
-    found, configuration = summary["found"], summary.get("configuration", {})
+    settings, configuration = summary["found"], summary.get("configuration", {})
     finished = bool(summary.get("record", {}).get("finished", True))
     state: RunState = "finished" if finished else "recording" if grows(newest) else "stopped"
     recorded_s = summary.get("speed", {}).get("recorded_s")
-    frequencies = found.get("frequency_hz") or [k * found["rate_hz"] / found["window"] for k in found.get("bins", [])]
+    frequencies = settings.get("frequency_hz") or [
+        k * settings["rate_hz"] / settings["window"] for k in settings.get("bins", [])
+    ]
     tone, message, alarms = _verdict(summary)
     try:
         notes = read_notes(run)
@@ -170,11 +171,11 @@ def _channels(signals: Mapping[str, Any]) -> Iterator[str]:
 
 def _leaves(value: object) -> Iterator[str]:
     if isinstance(value, dict):
-        for one in value.values():
-            yield from _leaves(one)
+        for inner in value.values():
+            yield from _leaves(inner)
     elif isinstance(value, list):
-        for one in value:
-            yield from _leaves(one)
+        for inner in value:
+            yield from _leaves(inner)
     elif isinstance(value, str):
         yield value
 
@@ -203,13 +204,10 @@ def _begun(run: Path, summary: dict[str, Any]) -> float | None:
 
 
 def _first_s(run: Path) -> float | None:
-    """Time of the first response: from the manifest, or from the foot of the table, which is not read itself."""
+    """Time of the first response, from the manifest."""
     try:
-        if (run / "open").is_dir():
-            return next((s.first_s for s in Manifest.read(run).segments if s.table == "responses"), None)
-        with open_read(run, "responses.parquet") as file:
-            return read_footer(file).statistics(0, "time_s").minimum
-    except (LivebodeError, OSError, ValueError, LookupError):
+        return next((s.first_s for s in Manifest.read(run).segments if s.table == "responses" and s.rows), None)
+    except (LivebodeError, OSError):
         return None
 
 
@@ -220,10 +218,10 @@ def _size(run: Path) -> tuple[int, dict[str, float]]:
         for name in names:
             path = os.path.join(folder, name)
             try:
-                found = os.lstat(path)
+                status = os.lstat(path)
             except OSError:  # it was just renamed
                 continue
-            if stat.S_ISREG(found.st_mode):
-                total += found.st_size
-                changed[os.path.relpath(path, run)] = found.st_mtime
+            if stat.S_ISREG(status.st_mode):
+                total += status.st_size
+                changed[os.path.relpath(path, run)] = status.st_mtime
     return total, changed

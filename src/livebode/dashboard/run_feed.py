@@ -11,9 +11,11 @@ import numpy as np
 
 from livebode.core import Event, Responses
 from livebode.dashboard.hub import Item
+from livebode.dashboard.matrix_group import MatrixGroup
+from livebode.dashboard.recent import TrendRows
 from livebode.dashboard.state import State
-from livebode.dashboard.trends import TrendRows
-from livebode.records import RunRecord, still_waiting, thinned
+from livebode.estimates import kind_of, rule
+from livebode.records import RunRecord, read_summary, still_waiting, thinned
 
 _LONG_BYTES = 16 << 20  # larger tables are not read whole
 _MEANS = 2000
@@ -117,8 +119,43 @@ class RunFeed:
             model, name, unit = (table.text(c)[new] for c in ("model", "name", "unit"))
             both = model.at * len(name.words) + name.at
             _, first = np.unique(both, return_index=True)
-            for at in np.sort(first).tolist():
-                use = both == both[at]
-                one = {c: x[use] for c, x in column.items()}
-                rows = TrendRows(**one | {c: one[c][:, np.newaxis] for c in ("value", "sigma")})
-                yield model[at], name[at], unit[at], rows
+            for row in np.sort(first).tolist():
+                use = both == both[row]
+                columns = {c: x[use] for c, x in column.items()}
+                rows = TrendRows(**columns | {c: columns[c][:, np.newaxis] for c in ("value", "sigma")})
+                yield model[row], name[row], unit[row], rows
+
+
+def views_of(directory: Path, first_axis: int = 0) -> list[tuple[State, RunFeed]]:
+    """The states of a run with all its data; LivebodeError if it cannot be read."""
+    summary, _ = read_summary(directory)
+    page = rule(kind_of(summary), "page") or views_of_response  # which says why there is none
+    return page(directory, directory.resolve().name, first_axis)
+
+
+def views_of_response(directory: Path, name: str, first_axis: int) -> list[tuple[State, RunFeed]]:
+    """The only axis of a run with single responses."""
+    state, viewed = State(name, first_axis), RunFeed(directory)
+    viewed.fill(state)
+    return [(state, viewed)]
+
+
+def views_of_matrix(directory: Path, name: str, first_axis: int) -> list[tuple[State, RunFeed]]:
+    """All entries: of a long run from its means, else from one reading of the matrices."""
+    run = RunRecord.open(directory, matrix=True)
+    settings = run.summary["found"]
+    group = MatrixGroup(name, tuple(settings["outputs"]), tuple(settings["inputs"]), first_axis)
+    views = []
+    for number, (output, input) in enumerate(group.entries):
+        entry = f"{output}/{input}"
+        state, viewed = State(f"{name} {entry}", first_axis + number), RunFeed(directory, entry)
+        state.group, state.entry = group, entry
+        viewed.begin(state)
+        views.append((state, viewed))
+    if not all(viewed.fill_from_means(state) for state, viewed in views):
+        for part in run.matrix_batches():
+            for (state, viewed), (output, input) in zip(views, group.entries):
+                viewed.pass_new(state, part.entry(output, input))
+    for state, viewed in views:
+        viewed.rest(state)
+    return views

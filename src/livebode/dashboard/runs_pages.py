@@ -24,14 +24,14 @@ from livebode.core import LivebodeError, ServerError, UsageError, document_funct
 from livebode.dashboard.access import Access, Role, error_answer
 from livebode.dashboard.board import Board
 from livebode.dashboard.guard import body
-from livebode.dashboard.matrix_view import views_of
 from livebode.dashboard.queries import json_object
 from livebode.dashboard.run_catalogue import RunCatalogue, details
+from livebode.dashboard.run_feed import views_of
 from livebode.language import Message, negotiated
 from livebode.records import Notes, delete, to_json, write_notes
 
 NAME_LETTERS_MAX = 255
-VERSION_MAX = 1 << 53
+VERSION_MAX = 1 << 53  # the largest whole number that JavaScript represents exactly
 
 
 def version(query: Mapping[str, str]) -> int:
@@ -130,27 +130,27 @@ class OpenedRuns:
             If 8 other runs are in use.
         """
         async with self._opening:
-            found = self._runs.get(directory.name)
+            run = self._runs.get(directory.name)
             # Another run of the same name, or an internal error has stopped it.
-            if found is not None and (found.directory != _identity(directory) or found.beating.done()):
+            if run is not None and (run.directory != _identity(directory) or run.beating.done()):
                 self.close(directory.name)
-                found = None
-            if found is None:
+                run = None
+            if run is None:
                 self._make_room()
-                found = self._runs[directory.name] = await self._open(directory)
+                run = self._runs[directory.name] = await self._open(directory)
         self._runs.move_to_end(directory.name)
-        found.users += 1
+        run.users += 1
         try:
-            yield found.page
+            yield run.page
         finally:
-            found.users -= 1
+            run.users -= 1
 
     def close(self, name: str) -> None:
         """Remove a run from memory and disconnect its browsers."""
-        if (found := self._runs.pop(name, None)) is not None:
-            found.board.places.displace_all()
-            found.beating.cancel()
-            found.board.close()
+        if (run := self._runs.pop(name, None)) is not None:
+            run.board.places.displace_all()
+            run.beating.cancel()
+            run.board.close()
 
     async def _open(self, directory: Path) -> _OpenedRun:
         identity = _identity(directory)
@@ -170,8 +170,8 @@ class OpenedRuns:
 
 
 def _identity(directory: Path) -> tuple[int, int]:
-    found = os.stat(directory)
-    return found.st_dev, found.st_ino
+    status = os.stat(directory)
+    return status.st_dev, status.st_ino
 
 
 BODY_BYTES_MAX = 16 << 10
@@ -239,15 +239,15 @@ class RunsPages:
         """Rows that changed since the version that the page has."""
         if (role := self._role(request)) is None:
             return _unknown()
-        found = await self._board.elsewhere(self._catalogue.rows, version(request.query_params))
-        return _json(found | {"role": role, "directory": self._catalogue.directory.resolve().name})
+        rows = await self._board.elsewhere(self._catalogue.rows, version(request.query_params))
+        return _json(rows | {"role": role, "directory": self._catalogue.directory.resolve().name})
 
     async def trends(self, request: Request) -> Response:
         """Points and alarms of runs that changed since the version that the page has."""
         if self._role(request) is None:
             return _unknown()
-        found = await self._board.elsewhere(self._catalogue.trends, version(request.query_params))
-        return _json(found)
+        trends = await self._board.elsewhere(self._catalogue.trends, version(request.query_params))
+        return _json(trends)
 
     async def trend(self, request: Request) -> Response:
         """Many points of one run, for a zoomed chart."""

@@ -15,8 +15,7 @@ import uvicorn
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 from websockets.protocol import State
 
-from livebode.dashboard.listener import Listener
-from livebode.dashboard.patience import PatientProtocol
+from livebode.dashboard.listener import Listener, PatientProtocol
 
 
 class WebSocketProtocol(WebSocketsSansIOProtocol):
@@ -90,7 +89,7 @@ class Faults:
         self._report = report
         self._count, self._reported_s = 0, float("-inf")
 
-    def report(self, error: BaseException | None, what: str = "") -> None:
+    def report(self, error: BaseException | None, text: str = "") -> None:
         """Report an error."""
         self._count += 1
         now_s = time.monotonic()
@@ -100,7 +99,7 @@ class Faults:
         frames = traceback.extract_tb(error.__traceback__) if error is not None else []
         place = f" at {frames[-1].filename}:{frames[-1].lineno}" if frames else ""
         often = f", the {self._count}th" if self._count > 1 else ""
-        about = (what or repr(error))[:_FAULT_LETTERS_MAX]  # an error may contain the data that it is about
+        about = (text or repr(error))[:_FAULT_LETTERS_MAX]  # an error may contain the data that it is about
         self._report(f"internal error in the dashboard{often}: {about}{place}; the run continues")
 
     def handler(self, _loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:

@@ -19,7 +19,7 @@ _MAKE = 'umask 077; python -c "import secrets; print(secrets.token_urlsafe(32))"
 
 
 @dataclass(frozen=True, repr=False)
-class Serving:
+class ServerSettings:
     """A ServeSection with the secrets read from their files.
 
     Attributes
@@ -48,7 +48,7 @@ class Serving:
     language: str | None = None
 
     @classmethod
-    def of(cls, section: ServeSection) -> Serving:
+    def of(cls, section: ServeSection) -> ServerSettings:
         """Build it from the configuration.
 
         Raises

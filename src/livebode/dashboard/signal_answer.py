@@ -86,8 +86,8 @@ def amplitude_spectrum(x: NDArray[np.float64], rate_hz: float, window: int) -> A
     enough = np.flatnonzero(whole >= WINDOWS * window)
     if not enough.size:
         return None
-    at = int(enough[-1])
-    stop, samples = int(edges[at + 1]), int(whole[at])
+    longest = int(enough[-1])
+    stop, samples = int(edges[longest + 1]), int(whole[longest])
     piece = x[stop - samples : stop]
     weight = 0.5 - 0.5 * np.cos(2 * np.pi * np.arange(samples) / samples)
     amplitude = 2 * np.abs(np.fft.rfft((piece - piece.mean()) * weight)) / weight.sum()
@@ -197,11 +197,11 @@ def remark_of(x: NDArray[np.float64]) -> Remark:
 
 def _cut_off(x: NDArray[np.float64], value: float) -> int:
     """Samples in flat pieces at this value whose edges are steep."""
-    at = np.flatnonzero(x == value)
-    if len(at) < _FLAT_MIN:
+    index = np.flatnonzero(x == value)
+    if len(index) < _FLAT_MIN:
         return 0
-    breaks = np.flatnonzero(np.diff(at) > 1)
-    starts, stops = at[np.append(0, breaks + 1)], at[np.append(breaks, -1)] + 1
+    breaks = np.flatnonzero(np.diff(index) > 1)
+    starts, stops = index[np.append(0, breaks + 1)], index[np.append(breaks, -1)] + 1
     flat = stops - starts >= _FLAT_MIN
     starts, stops = starts[flat], stops[flat]
     if not starts.size:
@@ -244,20 +244,20 @@ def answer(block: Block, lines: Lines, picture: Picture) -> bytes:
 def _channel(channel: Channel, x: NDArray[np.float64], lines: Lines, picture: Picture) -> tuple[dict[str, Any], _Parts]:
     about: dict[str, Any] = {"name": channel.name, "unit": channel.unit, **asdict(remark_of(x))}
     if picture == "time":
-        at = extremes(x)
-        return about | {"points": len(at)}, [at.astype("<u4"), x[at].astype("<f4")]
-    found = amplitude_spectrum(x, lines.rate_hz, lines.window)
-    if found is None:
+        points = extremes(x)
+        return about | {"points": len(points)}, [points.astype("<u4"), x[points].astype("<f4")]
+    spectrum = amplitude_spectrum(x, lines.rate_hz, lines.window)
+    if spectrum is None:
         return about | {"points": 0, "seconds": 0.0, "resolution_hz": None}, []
-    at, low = columns_of(found.amplitude, logarithmic=picture == "log")
+    points, low = columns_of(spectrum.amplitude, logarithmic=picture == "log")
     about |= {
-        "points": len(at),
-        "seconds": found.samples / found.rate_hz,
-        "resolution_hz": found.resolution_hz,
-        "lines": found.at(np.array(lines.bins), lines.window).tolist(),
-        "detection": found.at(np.array(lines.quiet, dtype=np.int64), lines.window).tolist(),
+        "points": len(points),
+        "seconds": spectrum.samples / spectrum.rate_hz,
+        "resolution_hz": spectrum.resolution_hz,
+        "lines": spectrum.at(np.array(lines.bins), lines.window).tolist(),
+        "detection": spectrum.at(np.array(lines.quiet, dtype=np.int64), lines.window).tolist(),
     }
-    return about, [v.astype("<f4") for v in (found.frequency_hz[at], found.amplitude[at], low)]
+    return about, [v.astype("<f4") for v in (spectrum.frequency_hz[points], spectrum.amplitude[points], low)]
 
 
 def _packed(head: dict[str, Any], arrays: Iterable[NDArray[Any]]) -> bytes:

@@ -30,15 +30,15 @@ def recorded_block(run: RunRecord, at_s: float) -> Block | None:
     """The recorded samples around a time, NaN where samples are missing; None if there are none."""
     lines = run.lines
     half_s = span_samples(lines.rate_hz, lines.window, 1) / lines.rate_hz / 2
-    found = []
+    tables = []
     for table in run.tables("samples", span_s=(at_s - half_s, at_s + half_s)):
         time_s = table["time_s"]
         within = np.flatnonzero((time_s >= at_s - half_s) & (time_s < at_s + half_s))
         if within.size:
-            found.append(table.slice(int(within[0]), int(within[-1]) + 1 - int(within[0])))
-    if not found:
+            tables.append(table.slice(int(within[0]), int(within[-1]) + 1 - int(within[0])))
+    if not tables:
         return None
-    table = Table.join(found)
+    table = Table.join(tables)
     sample, time_s, *values = (table[name] for name in table.column_names)
     start = int(sample[0])
     channels = channels_of(table.schema)

@@ -26,15 +26,14 @@ from livebode.dashboard.matrix_group import MatrixGroup
 from livebode.dashboard.notices import EventCauses
 from livebode.dashboard.overlays import FittedCurve, Healthy, HealthyEntry, grid_hz, overlays_of
 from livebode.dashboard.quantities import QUANTITIES, Quantities
-from livebode.dashboard.recent import RECORDED_VALUES_MAX, RecentResponses
-from livebode.dashboard.trends import Trends
+from livebode.dashboard.recent import RECORDED_VALUES_MAX, RecentResponses, Trends
 from livebode.language import for_page
 from livebode.records import RunRecord, to_json
 from livebode.runtime import RunControl
 
 _SYMBOLS = {"plant": "G", "open loop": "L", "closed loop": "T", "sensitivity": "S"}
 _PACE_S = 3.0
-_SILENT_S = 2.0
+_SILENT_S = 2.0  # or three usual intervals, for sources that send rarely
 _BACKLOG_S = 2.0
 _GROWS_S = 10.0
 _SENT = 90  # responses that were sent in three seconds: one that a person freezes is among them
@@ -93,7 +92,7 @@ class State:
 
     @property
     def readable(self) -> bool:
-        """Whether the record can be read: in segments at any time, in one piece after the end of the run."""
+        """Whether the record can be read: with a journal at any time, without one after the end of the run."""
         return not self.live or "record" in self._summary
 
     def begin(self, directory: Path, summary: Mapping[str, Any]) -> None:
@@ -165,7 +164,7 @@ class State:
         """Add responses, parameters and events in the order of arrival."""
         for item in items:
             if isinstance(item, Responses):
-                self._take_responses(item)
+                self._add_responses(item)
             elif isinstance(item, Event):
                 self.notices.add(item)
             else:
@@ -174,28 +173,28 @@ class State:
     def add_past(self, first: Responses, means: Responses, newest: Responses, count: int) -> None:
         """Add a long run: its first responses, means of the whole run, the newest responses, the number of all."""
         self.overview.add(means)
-        self._take_times(first)
+        self._add_times(first)
         self._seen += count - len(newest)
-        self._take_newest(newest)
+        self._set_newest(newest)
 
-    def _take_responses(self, responses: Responses) -> None:
+    def _add_responses(self, responses: Responses) -> None:
         if not len(responses):
             return
         if self._shared is None:
             self.overview.add(responses)
-        self._take_newest(responses)
+        self._set_newest(responses)
 
-    def _take_newest(self, responses: Responses) -> None:
+    def _set_newest(self, responses: Responses) -> None:
         self._seen += len(responses)
         self._grew = time.monotonic()
         self.recent.add(responses)
         use = np.flatnonzero(responses.valid.any(axis=1))
-        at = int(use[-1]) if use.size else len(responses) - 1
-        self.newest = responses[at : at + 1]
+        row = int(use[-1]) if use.size else len(responses) - 1
+        self.newest = responses[row : row + 1]
         self.version += 1
-        self._take_times(responses)
+        self._add_times(responses)
 
-    def _take_times(self, responses: Responses) -> None:
+    def _add_times(self, responses: Responses) -> None:
         """First windows begin before the recording: their centres are no times at which anything was measured."""
         if not np.isfinite(self.start_s):
             middle = (responses.first[0] + responses.sample[0]) / 2
@@ -222,18 +221,18 @@ class State:
             self.sent.append(self.newest)
         return self.frames_of("newest", self.newest, quantity, newest=True)
 
-    def frames_of(self, kind: str, one: Responses, quantity: Quantity, *, newest: bool = False) -> bytes:
+    def frames_of(self, kind: str, response: Responses, quantity: Quantity, *, newest: bool = False) -> bytes:
         """Frames of one response as `kind` and of its overlays; the newest is cached for other browsers."""
         key = (kind, quantity, float(self.version))
         if newest and key in self._made:
             return self._made[key]
         assert self.quantities is not None
-        parts = [frame(kind, self.axis, self.quantities.of_responses(one, quantity))]
-        moment = None if newest else float(one.time_s[0])
-        if self._fitted is not None and (found := self._fitted.curve(self.trends, quantity, moment)) is not None:
-            parts.append(curve("model", self.axis, quantity, *found))
+        parts = [frame(kind, self.axis, self.quantities.of_responses(response, quantity))]
+        moment = None if newest else float(response.time_s[0])
+        if self._fitted is not None and (fitted := self._fitted.curve(self.trends, quantity, moment)) is not None:
+            parts.append(curve("model", self.axis, quantity, *fitted))
         if self._healthy is not None:
-            near = self._healthy.response(one, self._schedule_before(one))
+            near = self._healthy.response(response, self._schedule_before(response))
             if near is not None:
                 parts.append(frame("baseline", self.axis, self.quantities.of_responses(near, quantity)))
         made = b"".join(parts)
@@ -245,12 +244,12 @@ class State:
         """The recent responses after the first `after`, at most the newest `most`."""
         return self.recent.newest(min(self.recent.count - after, most))
 
-    def _schedule_before(self, one: Responses) -> float:
+    def _schedule_before(self, response: Responses) -> float:
         recent = self.recent.newest(64)
         if recent is None:
             return float("nan")
-        window_s = one.lines.window / one.lines.rate_hz
-        before = np.flatnonzero(recent.time_s <= one.time_s[0] - window_s)
+        window_s = response.lines.window / response.lines.rate_hz
+        before = np.flatnonzero(recent.time_s <= response.time_s[0] - window_s)
         return float(recent.schedule[before[-1]]) if before.size else float("nan")
 
     def facts(self) -> dict[str, Any]:
@@ -260,7 +259,7 @@ class State:
         if q is None:
             return facts
         words = recorded_configuration(dict(self._summary))
-        found = self._summary["found"]
+        settings = self._summary["found"]
         return facts | {
             "begun": True,
             "directory": str(self.directory),
@@ -269,7 +268,7 @@ class State:
             "grid_hz": grid_hz(q.lines).tolist(),
             "rate_hz": q.lines.rate_hz,
             "window": q.lines.window,
-            "format": found.get("format", ""),
+            "format": settings.get("format", ""),
             "quantity": q.own,
             "quantities": [
                 {
@@ -282,7 +281,7 @@ class State:
                 for name in QUANTITIES
             ],
             "signals": words.get("signals", {}),
-            "schedule": found.get("schedule") or words.get("signals", {}).get("schedule", ""),
+            "schedule": settings.get("schedule") or words.get("signals", {}).get("schedule", ""),
             "model": self._fitted.model.name if self._fitted else "",
             "baseline": self._healthy is not None,
             "remark": for_page(self._remark),
@@ -319,7 +318,7 @@ class State:
         while len(self._pace) > 2 and self._pace[0][0] < now - _PACE_S:
             self._pace.popleft()
         (then, before), gone = self._pace[0], self._seen - self._pace[0][1]
-        found: dict[str, Any] = {
+        health_facts: dict[str, Any] = {
             "responses": self._seen,
             "responses_per_s": gone / (now - then) if now > then and before >= 0 else None,
             "events": self.notices.counts,
@@ -327,16 +326,16 @@ class State:
         }
         hub = self.hub
         if hub is None:
-            return found | {"counts": self._summary.get("counts"), "source": self._summary.get("source")}
+            return health_facts | {"counts": self._summary.get("counts"), "source": self._summary.get("source")}
         delays = np.array(hub.delays_s) * 1e3
-        found |= {"samples": hub.samples, "gaps": hub.gaps, "given_up": hub.given_up}
+        health_facts |= {"samples": hub.samples, "gaps": hub.gaps, "given_up": hub.given_up}
         silent_s, stale = self.silence()
-        found |= {"silent_s": silent_s, "stale": stale, "backlog_s": self.backlog_s()}
+        health_facts |= {"silent_s": silent_s, "stale": stale, "backlog_s": self.backlog_s()}
         if delays.size:
-            found |= {"behind_ms": float(np.median(delays)), "behind_p99_ms": float(np.quantile(delays, 0.99))}
+            health_facts |= {"behind_ms": float(np.median(delays)), "behind_p99_ms": float(np.quantile(delays, 0.99))}
         if (health := hub.health) is not None:
-            found["source"] = asdict(health)
-        return found
+            health_facts["source"] = asdict(health)
+        return health_facts
 
     def silence(self) -> tuple[float, bool]:
         """How long no samples have arrived, and whether that is longer than usual."""
@@ -354,8 +353,8 @@ class State:
     def has_baseline(self) -> bool:
         """Whether the run is compared with a baseline, also where that cannot be drawn."""
         configured = self._summary.get("configuration", {}).get("monitoring") or {}
-        found = self._summary.get("monitoring") or {}
-        return self._healthy is not None or bool(configured.get("baseline") or found.get("baseline"))
+        monitoring = self._summary.get("monitoring") or {}
+        return self._healthy is not None or bool(configured.get("baseline") or monitoring.get("baseline"))
 
     @property
     def judged(self) -> bool:

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from livebode.configuration import Axis, ServeSection
 from livebode.core import LivebodeError, why
-from livebode.dashboard import Serving, listening
+from livebode.dashboard import ServerSettings, listening
 from livebode.doctor.check import Check
 from livebode.records import SegmentLimits
 from livebode.sources.live import BUFFER_BYTES
@@ -108,7 +108,7 @@ def check_dashboard_port(axes: Mapping[str, Axis]) -> Check:
     section = described or ServeSection()
     facts = {"address": section.address, "port": section.port}
     try:
-        with listening(Serving.of(section)):
+        with listening(ServerSettings.of(section)):
             pass
     except LivebodeError as error:
         failed = Check.of_error(DASHBOARD_PORT, error)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from livebode.core import Block, Lines, Response, SignalError, UsageError, needing
-from livebode.estimation.moments import power
-from livebode.estimation.welch_average import independent_windows
+from livebode.estimation.products import power
+from livebode.estimation.quotient import independent_windows
 
 
 def welch(

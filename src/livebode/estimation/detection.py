@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Floats
 from livebode.core import GridError, Lines
-from livebode.estimation.moments import power, scaled, times
+from livebode.estimation.products import power, scaled, times
 from livebode.estimation.tracker_settings import DETECTION_LINES_MIN
 
 _BESIDE = 4  # detection lines on each side of a line, and at most as many beyond the outermost lines
@@ -52,9 +52,9 @@ class Groups:
 
     def __init__(self, lines: NDArray[np.int64], bins: NDArray[np.int64]) -> None:
         above = np.searchsorted(bins, lines)[:, np.newaxis] + np.arange(_BESIDE)
-        at = np.stack([above - _BESIDE, above])  # (sides, lines, bins of a side)
-        member = (at >= 0) & (at < len(bins))
-        self.places, self.member = at.clip(0, max(len(bins) - 1, 0)), member
+        positions = np.stack([above - _BESIDE, above])  # (sides, lines, bins of a side)
+        member = (positions >= 0) & (positions < len(bins))
+        self.places, self.member = positions.clip(0, max(len(bins) - 1, 0)), member
         count = member.sum(axis=2)
         with np.errstate(invalid="ignore", divide="ignore"):
             centre = np.where(member, bins[self.places], 0).sum(axis=2) / count
@@ -103,10 +103,10 @@ class DetectionNoise:
                 detection_lines=len(lines.quiet),
                 detection_lines_min=DETECTION_LINES_MIN,
             )
-        at = np.asarray(lines.bins)
+        bins = np.asarray(lines.bins)
         self.bins = np.sort(np.array(lines.quiet + outside, dtype=np.int64))
-        self._interpolation = Interpolation(at, self.bins)
-        self._groups = Groups(at, self.bins)
+        self._interpolation = Interpolation(bins, self.bins)
+        self._groups = Groups(bins, self.bins)
         self.dof = float(self._groups.dof.min())
 
     def power(self, ratio: Complex, numerator: Complex, denominator: Complex, excited: Floats | None) -> Floats:
@@ -121,7 +121,7 @@ class DetectionNoise:
         excited
             Power of the excitation at the detection lines over that at the lines; excited bins are ignored.
         """
-        rest = power(numerator - times(self._interpolation.at(ratio), denominator))
+        residual = power(numerator - times(self._interpolation.at(ratio), denominator))
         if excited is not None:
-            rest = np.where(excited > _POWERLESS, np.nan, rest)
-        return self._groups.at(rest)
+            residual = np.where(excited > _POWERLESS, np.nan, residual)
+        return self._groups.at(residual)

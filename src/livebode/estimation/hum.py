@@ -1,4 +1,4 @@
-"""Hum of the mains: tones at multiples of 50 or 60 Hz that repeat with the window, and where it is in silence."""
+"""Hum of the mains: lines that it may disturb, and its frequencies and amplitudes without excitation."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from livebode.core import MAINS_HZ, Lines, SignalError, Stage, StatefulBase
 
 _ON_BIN = 0.1  # bins: a tone this close to a bin has nearly all its power there
 HARMONICS = 10
-_NEIGHBOURS = np.array([-4, -3, -2, -1, 1, 2, 3, 4])
+_MAINS_BESIDE = np.array([-4, -3, -2, -1, 1, 2, 3, 4])
 _CHANCE = 1e-8  # of noise alone to be taken for a tone: (1 + r/n)^-n for a power of r times the mean of n neighbours
 
 _MATTERS = 1e-8
@@ -39,21 +39,21 @@ class Mains:
     """
 
     def __init__(self, lines: Lines) -> None:
-        at, highest = np.asarray(lines.bins), (lines.window - 1) // 2
-        self.lines = np.zeros((len(MAINS_HZ), len(at)), dtype=np.bool_)
+        bins, highest = np.asarray(lines.bins), (lines.window - 1) // 2
+        self.lines = np.zeros((len(MAINS_HZ), len(bins)), dtype=np.bool_)
         free = []
         for i, mains_hz in enumerate(MAINS_HZ):
-            self.lines[i] = np.isin(at, _on_bins(mains_hz, lines, highest))
-            tones = np.setdiff1d(_on_bins(mains_hz, lines, HARMONICS), at)
+            self.lines[i] = np.isin(bins, _on_bins(mains_hz, lines, highest))
+            tones = np.setdiff1d(_on_bins(mains_hz, lines, HARMONICS), bins)
             free.append(tones if self.lines[i].any() else tones[:0])
         self._any = np.asarray(self.lines.any(axis=0))
         # Distortion is at multiples of the lines' common divisor, and of odd lines at odd or at even ones alone:
         # at these distances it is like that at the harmonic.
-        distances = _NEIGHBOURS * int(np.lcm(2, gcd(*lines.bins)))
-        barred = np.concatenate([at, *free])
+        distances = _MAINS_BESIDE * int(np.lcm(2, gcd(*lines.bins)))
+        barred = np.concatenate([bins, *free])
         self.free = [Neighbours(tones, distances, barred, highest) for tones in free]
         barred = np.concatenate(free)
-        self.excited = Neighbours(at if self._any.any() else at[:0], 2 * _NEIGHBOURS, barred, highest)
+        self.excited = Neighbours(bins if self._any.any() else bins[:0], 2 * _MAINS_BESIDE, barred, highest)
         groups = [*self.free, self.excited]
         self.bins = np.unique(np.concatenate([group.bins for group in groups]))
         for group in groups:
@@ -68,8 +68,8 @@ class Mains:
         if not self.any:
             return np.zeros((len(output), self._any.size), dtype=np.bool_)
         least = _MATTERS * output[:, self.excited.tones].max(axis=1, keepdims=True)
-        found = [(group.stand_out(output) & (output[:, group.tones] > least)).any(axis=1) for group in self.free]
-        return np.asarray((self.lines & np.array(found).T[:, :, np.newaxis]).any(axis=1))
+        stands_out = [(group.stand_out(output) & (output[:, group.tones] > least)).any(axis=1) for group in self.free]
+        return np.asarray((self.lines & np.array(stands_out).T[:, :, np.newaxis]).any(axis=1))
 
     def alone(self, output: Floats) -> tuple[Floats, NDArray[np.bool_]]:
         """In a period without excitation: the power at each line, and whether it is that of a tone there.
@@ -243,11 +243,11 @@ def find_hum(signals: Mapping[str, Floats], rate_hz: float) -> list[Hum]:
             seconds=samples / rate_hz,
             seconds_min=SECONDS_MIN,
         )
-    found = _tones(signals, rate_hz, _PARTS)
+    tones = _tones(signals, rate_hz, _PARTS)
     parts = int(samples / rate_hz / _PART_S)
     if parts >= 2 * _PARTS:
-        found = _tones(signals, rate_hz, parts) | found  # thirds have the best frequency
-    return [found[multiple] for multiple in sorted(found)]
+        tones = _tones(signals, rate_hz, parts) | tones  # thirds have the best frequency
+    return [tones[multiple] for multiple in sorted(tones)]
 
 
 def disturbed_lines(tones: Sequence[Hum], lines: Lines) -> NDArray[np.bool_]:
@@ -267,15 +267,15 @@ def _tones(signals: Mapping[str, Floats], rate_hz: float, parts: int) -> dict[fl
     spectra = {name: _spectra(x, parts) for name, x in signals.items()}
     resolution_hz = rate_hz / (min(x.size for x in signals.values()) // parts)
     near = np.rint(_MULTIPLES / resolution_hz).astype(np.int64)
-    found = {}
+    hum = {}
     highest_hz = (rate_hz / 2 - (_LOBE + 1) * resolution_hz) / (1 + _REACH)
     for f in _MULTIPLES[highest_hz > _MULTIPLES].tolist():
         turn = 2 * np.pi * _DRIFT * f / resolution_hz**2
         tones = {name: tone for name, x in spectra.items() if (tone := _tone(x, f / resolution_hz, near, turn))}
         if tones:
             bins = max(tones.values(), key=lambda tone: tone[1])[0]
-            found[f] = Hum(bins * resolution_hz, {name: amplitude for name, (_, amplitude) in tones.items()})
-    return found
+            hum[f] = Hum(bins * resolution_hz, {name: amplitude for name, (_, amplitude) in tones.items()})
+    return hum
 
 
 def _spectra(x: Floats, count: int) -> Complex:
@@ -297,15 +297,15 @@ def _tone(spectra: Complex, expected: float, multiples: NDArray[np.int64], turn:
     power = np.abs(spectra) ** 2
     mean, reach = power.mean(axis=0), max(1, round(_REACH * expected))
     first = max(round(expected) - reach, 1)
-    at = first + int(np.argmax(mean[first : round(expected) + reach + 1]))
-    lobe = np.arange(max(at - _LOBE, 1), min(at + _LOBE, mean.size - 1) + 1)
-    if mean[at] < mean[lobe].max():
+    peak = first + int(np.argmax(mean[first : round(expected) + reach + 1]))
+    lobe = np.arange(max(peak - _LOBE, 1), min(peak + _LOBE, mean.size - 1) + 1)
+    if mean[peak] < mean[lobe].max():
         return None  # the flank of another tone
-    beside = at + _BESIDE
+    beside = peak + _BESIDE
     beside = beside[(beside > 0) & (beside < mean.size)]
-    others = multiples[np.abs(multiples - at) > _LOBE + reach]
+    others = multiples[np.abs(multiples - peak) > _LOBE + reach]
     beside = beside[np.abs(beside[:, np.newaxis] - others).min(axis=1, initial=mean.size) > _LOBE]
-    if beside.size < _BESIDE.size // 2 or mean[at] <= prominence(beside.size // 2) * mean[beside].mean():
+    if beside.size < _BESIDE.size // 2 or mean[peak] <= prominence(beside.size // 2) * mean[beside].mean():
         return None
     place = float(np.average(lobe, weights=mean[lobe]))
     if abs(place - expected) > _REACH * expected + _OFF:
@@ -314,7 +314,7 @@ def _tone(spectra: Complex, expected: float, multiples: NDArray[np.int64], turn:
     noise = float(np.sqrt(mean[beside].mean() / of_part.mean()))
     lowest = of_part.min() / of_part.max() + _noise(len(power)) * noise
     if lowest < STEADY and (
-        lowest < _WANDER or _curvature(spectra[:, at]) > min(turn, _TURN_MAX) + 1.5 * _NOISE * noise
+        lowest < _WANDER or _curvature(spectra[:, peak]) > min(turn, _TURN_MAX) + 1.5 * _NOISE * noise
     ):
         return None
     return place, float(np.sqrt(of_part.mean()))

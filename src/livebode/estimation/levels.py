@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from livebode.arrays import Complex, Floats
 from livebode.core import Lines, Stage, StatefulBase, f_quantile, meets_mains
 from livebode.estimation.detection import Interpolation
-from livebode.estimation.moments import power
+from livebode.estimation.products import power
 from livebode.estimation.spectra import after
 from livebode.estimation.tracker_settings import Settings
 from livebode.language import Message
@@ -118,9 +118,9 @@ class DistortionLevels(StatefulBase):
         self._kinds = {"even": slice(0, even.size), "odd": slice(even.size, even.size + odd.size)}
         self.bins = np.concatenate([even, odd])
         self._resolution_hz, self._scale = lines.resolution_hz, 2 / lines.window
-        at = np.asarray(lines.bins)
-        self._interpolation = Interpolation(at, self.bins)
-        self._at, self._lines, self._beside = np.concatenate([at, self.bins]), len(at), slice(len(at), None)
+        bins = np.asarray(lines.bins)
+        self._interpolation = Interpolation(bins, self.bins)
+        self._at, self._lines, self._beside = np.concatenate([bins, self.bins]), len(bins), slice(len(bins), None)
         differenced, advanced = np.array(settings.differenced_roles), np.array(settings.advanced_ticks)
         rows = [settings.roles.index(role) for role in ("output", method.denominator, method.reference)]
         self._after = after(self._at, lines.window, differenced, advanced)[rows]
@@ -128,7 +128,11 @@ class DistortionLevels(StatefulBase):
         self._excited = _SAME_EXCITATION if method.reference == "excitation" else _SAME_INPUT
         self._begin()
         self._stretches = self._periods = 0
-        self._power, self._scatter, self._output = np.zeros(self.bins.size), np.zeros(self.bins.size), np.zeros(len(at))
+        self._power, self._scatter, self._output = (
+            np.zeros(self.bins.size),
+            np.zeros(self.bins.size),
+            np.zeros(len(bins)),
+        )
 
     def _begin(self) -> None:
         """Begin a stretch: number of its periods, means of the three signals, and moments of the first two."""
@@ -171,12 +175,12 @@ class DistortionLevels(StatefulBase):
             ratio = output[: self._lines] / np.where(of_line > _EXCITED * of_line.mean(), denominator[: self._lines], 0)
             model = self._interpolation.at(ratio)
         model = np.where(np.isfinite(model), model, np.nan)
-        rest = output[self._beside] - model * denominator[self._beside]
+        residual = output[self._beside] - model * denominator[self._beside]
         excited = excitation[self._beside] > self._excited * of_line.mean()
         of_output, of_input, shared = self._spread[:, self._beside]
         scatter = of_output.real - 2 * (model.conj() * shared).real + power(model) * of_input.real
         return (
-            self._power + np.where(excited, np.nan, self._now * power(rest)),
+            self._power + np.where(excited, np.nan, self._now * power(residual)),
             self._scatter + np.maximum(scatter, 0.0),
             self._output + self._now * power(output[: self._lines]),
         )
@@ -186,10 +190,13 @@ class DistortionLevels(StatefulBase):
         periods, stretches = self._periods + self._now, self._stretches + (self._now > 0)
         if periods <= stretches or not self.bins.size:
             return {}
-        found, scatter, output = self._sums()
+        total, scatter, output = self._sums()
         of_line = float(output.mean()) / periods
         noise = scatter / (periods - stretches)
-        return {kind: _level(found[at], noise[at], of_line, periods, stretches) for kind, at in self._kinds.items()}
+        return {
+            kind: _level(total[members], noise[members], of_line, periods, stretches)
+            for kind, members in self._kinds.items()
+        }
 
     def plain(self) -> dict[str, Any]:
         """For a record: the levels, and the amplitudes at the detection lines; empty where none is known."""
@@ -197,9 +204,9 @@ class DistortionLevels(StatefulBase):
         if not any(levels.values()):
             return {}
         periods, stretches = self._periods + self._now, self._stretches + (self._now > 0)
-        found, scatter, _ = self._sums()
+        total, scatter, _ = self._sums()
         noise = scatter / (periods - stretches) / periods
-        amplitudes = self._scale * np.sqrt(np.array([found / periods, noise]))
+        amplitudes = self._scale * np.sqrt(np.array([total / periods, noise]))
         amplitude, of_noise = ([None if np.isnan(a) else float(a) for a in row] for row in amplitudes)
         return {
             "periods": periods,
@@ -226,21 +233,21 @@ class DistortionLevels(StatefulBase):
         )
 
 
-def _level(found: Floats, noise: Floats, of_line: float, periods: int, stretches: int) -> Level | None:
+def _level(sums: Floats, noise: Floats, of_line: float, periods: int, stretches: int) -> Level | None:
     """From the sum over stretches of periods times power of the mean, and the variance of one period, (bins,)."""
-    known = np.isfinite(found)
+    known = np.isfinite(sums)
     count = int(np.count_nonzero(known))
     if count < _BINS_MIN or of_line <= 0:
         return None
-    total, by_chance = float(found[known].mean()), stretches * float(noise[known].mean())
+    total, by_chance = float(sums[known].mean()), stretches * float(noise[known].mean())
     limit = f_quantile(CHANCE, 2 * count * stretches, 2 * count * (periods - stretches))
     significant = bool(total > limit * by_chance and total > _ROUNDING * of_line * periods)
-    rest, one = max(total - by_chance, 0.0), by_chance / stretches
-    low, middle, high = np.nan, np.nan, rest + (limit - 1) * by_chance
+    excess, of_one = max(total - by_chance, 0.0), by_chance / stretches
+    low, middle, high = np.nan, np.nan, excess + (limit - 1) * by_chance
     if significant:
-        of_mean = 2 * rest * one + stretches * one**2 * (1 + stretches / (periods - stretches))
+        of_mean = 2 * excess * of_one + stretches * of_one**2 * (1 + stretches / (periods - stretches))
         half = _95_PERCENT * float(np.sqrt(of_mean / count))
-        low, middle, high = max(rest - half, 0.0), rest, rest + half
+        low, middle, high = max(excess - half, 0.0), excess, excess + half
     db = [_db(value / periods / of_line) for value in (middle, low, high, by_chance)]
     return Level(db[0], (db[1], db[2]), db[3], count, significant)
 

@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 from livebode.arrays import Complex, Flags, Floats
 from livebode.core import Channel, Event, PlantKinds, Responses, Stage, StatefulBase
 from livebode.estimation.detection import DetectionNoise, beyond
-from livebode.estimation.line_estimates import LineEstimates
-from livebode.estimation.moments import PeriodMoments, power, times
 from livebode.estimation.movement import Movement
 from livebode.estimation.periodicity import Periodicity
-from livebode.estimation.repeating import Repeating
+from livebode.estimation.periods import PeriodMoments
+from livebode.estimation.products import power, times
+from livebode.estimation.quantities import LineEstimates
+from livebode.estimation.repeating import RepeatingVerdicts
 from livebode.estimation.spectra import Hann, SpectraRows, check_instruction_set
 from livebode.estimation.tracker_settings import Role, Settings
 from livebode.kernel import (
@@ -141,7 +142,7 @@ class LineStage(StatefulBase):
         place: NDArray[np.int64],
         centre: Floats,
         channels: Sequence[Channel],
-        repeating: Repeating | None = None,
+        repeating: RepeatingVerdicts | None = None,
         ripple: Floats | None = None,
         aside: Flags | None = None,
     ) -> Responses:
@@ -178,7 +179,7 @@ class LineStage(StatefulBase):
         place: NDArray[np.int64],
         centre: Floats,
         unit: str,
-        repeating: Repeating | None,
+        repeating: RepeatingVerdicts | None,
         ripple: Floats | None,
         aside: Flags | None,
     ) -> Responses:
@@ -208,8 +209,8 @@ class LineStage(StatefulBase):
             dof_repeating,
             np.concatenate([centre, first[np.newaxis]]),
         )
-        found, self._largest = process_lines(self._kernel_settings, self._moments.arrays, windows)
-        estimates = LineEstimates.of(found)
+        results, self._largest = process_lines(self._kernel_settings, self._moments.arrays, windows)
+        estimates = LineEstimates.of(results)
         if ripple is not None:
             estimates = estimates.with_ripple(ripple, power(signals[s.method.denominator][:, :lines]))
         if self._converts:
@@ -218,9 +219,9 @@ class LineStage(StatefulBase):
                 estimates = estimates.without(_where_not(repeating.invalid[repeating.verdict], moving))
         if self._periodicity is not None:
             input_ = signals["input"][:, :lines]
-            leaks = self._periodicity.process(input_, found.usable, rows.sample, centre[0])
+            leaks = self._periodicity.process(input_, results.usable, rows.sample, centre[0])
             estimates = estimates.only(estimates.valid & ~_where_not(leaks, moving))
-        return _as_responses(s, found, estimates, rows.sample, unit)
+        return _as_responses(s, results, estimates, rows.sample, unit)
 
     @property
     def is_plain(self) -> bool:
@@ -248,37 +249,39 @@ class LineStage(StatefulBase):
         spectrum, sample, place, centre, channels
             As in `process`, with a row for each stage; every window is whole and clean.
         """
-        one = stages[0]
-        s = one._settings
+        example = stages[0]
+        s = example._settings
         first = sample - s.lines.window + 1
         windows = NewestWindows(
             np.array([stage._largest for stage in stages]),
-            (place // s.step - 1) % one._places,
+            (place // s.step - 1) % example._places,
             np.ascontiguousarray(spectrum),
             np.stack([*centre, first], axis=1),
         )
-        unit = one._unit_of(channels)
+        unit = example._unit_of(channels)
         with np.errstate(all="ignore"):
-            found, largest = process_each(one._kernel_settings, [stage._moments.arrays for stage in stages], windows)
+            results, largest = process_each(
+                example._kernel_settings, [stage._moments.arrays for stage in stages], windows
+            )
             for stage, power_max in zip(stages, largest.tolist()):
                 stage._largest = power_max
-            return _as_responses(s, found, LineEstimates.of(found), sample, unit)
+            return _as_responses(s, results, LineEstimates.of(results), sample, unit)
 
     def _detected(self, signals: dict[Role, Complex]) -> Floats | None:
         """Noise of one window by the detection lines, as a power of numerator·conj(reference); None without them."""
         if self._detection is None:
             return None
         method, lines = self._settings.method, len(self._settings.lines)
-        at, beside = slice(0, lines), slice(lines, None)
+        excited_part, beside = slice(0, lines), slice(lines, None)
         every = power(signals[method.reference])
         excited = None
         if method.reference == "excitation":
-            excited = every[:, beside] / every[:, at].mean(axis=1, keepdims=True)
+            excited = every[:, beside] / every[:, excited_part].mean(axis=1, keepdims=True)
         output, denominator = signals["output"], signals[method.denominator]
-        conjugate = signals[method.reference][:, at].conj()
-        ratio = times(output[:, at], conjugate) / times(denominator[:, at], conjugate)
+        conjugate = signals[method.reference][:, excited_part].conj()
+        ratio = times(output[:, excited_part], conjugate) / times(denominator[:, excited_part], conjugate)
         noise = self._detection.power(ratio, output[:, beside], denominator[:, beside], excited)
-        return np.ascontiguousarray(noise * every[:, at])
+        return np.ascontiguousarray(noise * every[:, excited_part])
 
     def _moves(self, series: int, centre: Floats, sample: NDArray[np.int64]) -> Flags | None:
         """Windows in which the machine moves; an Event for the first one whose noise is estimated in another way.
@@ -291,12 +294,12 @@ class LineStage(StatefulBase):
             return np.zeros(0, dtype=np.bool_)
         moving = self._movement.process(series, centre[1])
         if self._moving == 0 and moving.any():
-            at = int(np.argmax(moving))
+            first = int(np.argmax(moving))
             self._events.append(
                 Event(
                     "noise-from-detection-lines",
-                    int(sample[at]),
-                    float(centre[0, at]),
+                    int(sample[first]),
+                    float(centre[0, first]),
                     Message(
                         "the schedule moves: the noise is taken from detection lines (non-excited bins), because the "
                         "scatter between periods contains the motion"
@@ -308,19 +311,19 @@ class LineStage(StatefulBase):
 
 
 def _as_responses(
-    settings: Settings, found: LineRows, estimates: LineEstimates, sample: NDArray[np.int64], unit: str
+    settings: Settings, results: LineRows, estimates: LineEstimates, sample: NDArray[np.int64], unit: str
 ) -> Responses:
     return Responses(
         lines=settings.lines,
         value=estimates.value,
         sigma=estimates.sigma,
-        dof=found.dof,
+        dof=results.dof,
         coherence=estimates.coherence,
         valid=estimates.valid,
-        first=found.moment[2].astype(np.int64) if settings.average else sample - settings.lines.window + 1,
+        first=results.moment[2].astype(np.int64) if settings.average else sample - settings.lines.window + 1,
         sample=sample,
-        time_s=found.moment[0],
-        schedule=found.moment[1],
+        time_s=results.moment[0],
+        schedule=results.moment[1],
         quantity=settings.quantity,
         unit=unit,
         input_coherence=estimates.input_coherence,

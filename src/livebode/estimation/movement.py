@@ -48,21 +48,21 @@ class Movement(StatefulBase):
         """Which of these moments, at consecutive places from `place` on, belong to a machine that moves."""
         if np.isnan(schedule).all() and np.isnan(self._past).all():
             return np.zeros(schedule.size, dtype=np.bool_)
-        at = place + np.arange(schedule.size)
-        looked = np.flatnonzero(at % self._places % self._stride == 0)
+        places = place + np.arange(schedule.size)
+        looked = np.flatnonzero(places % self._places % self._stride == 0)
         moves = np.empty(schedule.size + 1, dtype=np.bool_)
         moves[0] = self._moves
-        moves[looked + 1] = self._look(at[looked], schedule[looked])
+        moves[looked + 1] = self._look(places[looked], schedule[looked])
         newest = np.zeros(moves.size, dtype=np.int64)
         newest[looked + 1] = looked + 1
         moves = moves[np.maximum.accumulate(newest)][1:]
         self._moves = bool(moves[-1])
         return moves
 
-    def _look(self, at: NDArray[np.int64], schedule: Floats) -> Flags:
-        if not at.size:
+    def _look(self, places: NDArray[np.int64], schedule: Floats) -> Flags:
+        if not places.size:
             return np.zeros(0, dtype=np.bool_)
-        row, column = at // self._places - at[0] // self._places, at % self._places // self._stride
+        row, column = places // self._places - places[0] // self._places, places % self._places // self._stride
         row = row + _BEFORE + int(column[0] < self._next)
         periods = np.full((int(row[-1]) + 1, self._past.shape[1]), np.nan)
         periods[: _BEFORE + 1] = self._past

@@ -11,13 +11,11 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Floats
 from livebode.core import Channel, Responses, Stage, StatefulBase
-from livebode.estimation.line_estimates import from_plant
 from livebode.estimation.line_stage import response_unit
-from livebode.estimation.local_polynomial import LocalPolynomial
-from livebode.estimation.quotient import Quotient
+from livebode.estimation.quantities import from_plant
+from livebode.estimation.quotient import LocalPolynomial, Quotient, WelchAverage
 from livebode.estimation.spectra import after
 from livebode.estimation.tracker_settings import Settings
-from livebode.estimation.welch_average import WelchAverage
 
 _EXCITED = 1e-12  # of the largest power so far, as for a LineStage
 # The input must respond to the excitation significantly. Where it contains only noise that came around the loop, the

@@ -121,7 +121,7 @@ class NonPeriodicTracker(StreamEstimator[InputStatistics]):
         for stretch in _stretches(finite):
             if finite[stretch.start]:
                 part = None if schedule is None else schedule[stretch]
-                rows += self._take(data[:, stretch], part, block.start + stretch.start, block)
+                rows += self._process(data[:, stretch], part, block.start + stretch.start, block)
             else:
                 self._restart()
         responses = self._lines.responses(rows, block.channels)
@@ -133,16 +133,16 @@ class NonPeriodicTracker(StreamEstimator[InputStatistics]):
         self._newest.count = 0
         self._centre.restart()
 
-    def _take(self, data: Floats, schedule: Floats | None, start: int, block: Block) -> list[Row]:
+    def _process(self, data: Floats, schedule: Floats | None, start: int, block: Block) -> list[Row]:
         """The rows at the hops of these samples, of which all are finite; the first one has the number `start`."""
         span, hop = self.settings.span, self.settings.step
         before = self._newest.count
         position = np.arange((span - before - 1) % hop, data.shape[1], hop)
         schedules = self._centre.at(schedule, position)
         rows, done = [], 0
-        for at, value in zip(position.tolist(), schedules):
-            self._newest.add(data[:, done : at + 1])
-            done, sample = at + 1, start + at
+        for last, value in zip(position.tolist(), schedules):
+            self._newest.add(data[:, done : last + 1])
+            done, sample = last + 1, start + last
             moment = np.array([block.origin_s + (sample - (span - 1) / 2) / block.rate_hz, value, sample - span + 1])
             whole = self._newest.count >= span
             hops = (self._newest.count - span) // hop

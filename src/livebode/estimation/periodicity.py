@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Flags, Floats
 from livebode.core import ANY_EXCITATION, Event, Lines, Stage, StatefulBase
-from livebode.estimation.moments import power, times
+from livebode.estimation.products import power, times
 from livebode.language import Message
 
 _CHANGED = 0.1  # of the input's power: a smaller change leaks less than it
@@ -75,11 +75,11 @@ class Periodicity(StatefulBase):
         sample, centre_s
             Newest sample and time of the centre of each window, shape (rows,).
         """
-        found = self._found(input_, usable)
+        irregular = self._found(input_, usable)
         self._counts[0] += np.count_nonzero(usable)
-        self._counts[1] += np.count_nonzero(found, axis=0)
-        self._report(found, sample, centre_s)
-        return found
+        self._counts[1] += np.count_nonzero(irregular, axis=0)
+        self._report(irregular, sample, centre_s)
+        return irregular
 
     def _found(self, input_: Complex, usable: Flags) -> Flags:
         rows, places = len(input_), len(self._before)
@@ -94,10 +94,10 @@ class Periodicity(StatefulBase):
         known, means, weights = np.isfinite(difference[:, 0]), np.empty_like(new), np.empty((2, rows))
         for first in range(0, rows, places):
             part = slice(first, first + places)
-            means[:, part], weights[:, part] = self._take(new[:, part], known[part])
+            means[:, part], weights[:, part] = self._averaged(new[:, part], known[part])
         return _does_not_repeat(difference, power_now, means, weights) & usable[:, np.newaxis]
 
-    def _take(self, new: Floats, known: Flags) -> tuple[Floats, Floats]:
+    def _averaged(self, new: Floats, known: Flags) -> tuple[Floats, Floats]:
         """Add at most one period to the means; return the means and weights without it."""
         rows = len(known)
         means, weights = self._means[:, :rows], self._weights[:, :rows]
@@ -109,16 +109,16 @@ class Periodicity(StatefulBase):
 
     def not_repeating_hz(self) -> list[float]:
         """Lines at which the input does not repeat in most of the windows."""
-        windows, found = self._counts
-        return [float(f) for f in self._lines.frequency_hz[2 * found > windows]]
+        windows, irregular = self._counts
+        return [float(f) for f in self._lines.frequency_hz[2 * irregular > windows]]
 
-    def _report(self, found: Flags, sample: NDArray[np.int64], centre_s: Floats) -> None:
-        rows = found.any(axis=1)
+    def _report(self, irregular: Flags, sample: NDArray[np.int64], centre_s: Floats) -> None:
+        rows = irregular.any(axis=1)
         if self._told or not rows.any():
             return
         self._told = True
         row = int(np.argmax(rows))
-        f = self._lines.frequency_hz[found[row]]
+        f = self._lines.frequency_hz[irregular[row]]
         where = ", ".join(f"{x:g}" for x in f[:_LISTED_MAX]) + " …" * (f.size > _LISTED_MAX)
         message = Message(
             "the input {input} does not repeat every {window} samples at {places} Hz: a response is not valid "
@@ -139,13 +139,13 @@ def _does_not_repeat(difference: Floats, every: Floats, means: Floats, weights: 
     dof = _OF_DIFFERENCES * count
     explained = scatter * dof * (_CHANCE ** (-1 / dof) - 1)  # F(2, 2·dof)
     most = (1 - 1 / (9 * dof) + _CHANCE_Z / (3 * np.sqrt(dof))) ** 3  # of chi², Wilson, Hilferty 1931
-    found = (2 * difference > _CHANGED * every) & (difference > explained) | (scatter > most * repeating)
-    return np.asarray(found | _turns(means, count) | (means[4] > _SHARE + _SHARE_SPREAD / np.sqrt(count)))
+    irregular = (2 * difference > _CHANGED * every) & (difference > explained) | (scatter > most * repeating)
+    return np.asarray(irregular | _turns(means, count) | (means[4] > _SHARE + _SHARE_SPREAD / np.sqrt(count)))
 
 
 def _turns(means: Floats, count: Floats) -> Flags:
     """Where the input turns from window to window by more than noise explains, shape (rows, lines)."""
     every, real, imaginary = means[1:4]
-    rest = np.maximum(every - np.hypot(real, imaginary), 0.0)
-    significant = imaginary**2 > _TURNED_SIGMAS**2 * every * rest / count
+    difference = np.maximum(every - np.hypot(real, imaginary), 0.0)
+    significant = imaginary**2 > _TURNED_SIGMAS**2 * every * difference / count
     return np.asarray((np.abs(imaginary) > _TURNED * every) & significant & (count >= _TURNED_WINDOWS_MIN))

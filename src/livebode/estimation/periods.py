@@ -1,16 +1,19 @@
-"""Whole periods of signals, cut from samples that come in any pieces."""
+"""Whole periods of signals, cut from samples that come in any pieces, and moments of line spectra over periods."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
+from math import ceil, log
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.arrays import Floats
-from livebode.core import StatefulBase
+from livebode.arrays import Complex, Floats
+from livebode.core import Stage, StatefulBase
+from livebode.kernel import MEANS, SCATTER, LineMoments, WeightSums
 
 _TOGETHER = 1 << 15  # samples of a signal in one batch: a few of such signals, and their spectra, stay in the cache
 
@@ -72,16 +75,16 @@ class PeriodCutter(StatefulBase):
         left_out
             Indices of the samples without which a period does not count.
         """
-        window, at, samples = self._window, self._at, data.shape[1]
-        count = (at + samples) // window
+        window, offset, samples = self._window, self._at, data.shape[1]
+        count = (offset + samples) // window
         complete = np.ones(count + 1, dtype=np.bool_)
         complete[0] = self._whole
         if left_out.size:
-            complete[(at + left_out) // window] = False
+            complete[(offset + left_out) // window] = False
         together = max(1, _TOGETHER // window)
         for first in range(0, count, together):
             last = min(count, first + together)
-            begin, end = first * window - at, last * window - at
+            begin, end = first * window - offset, last * window - offset
             signals, position = self._signals(data, begin, end), self._positions(schedule, begin, end)
             yield Periods(
                 self._differences(signals).reshape(len(data), last - first, window),
@@ -94,11 +97,11 @@ class PeriodCutter(StatefulBase):
                 self._samples[:, 0] = self._samples[:, -1]
                 if position is not None:
                     self._position[:] = position[-window:]
-        rest, at = (samples, at) if not count else ((at + samples) % window, 0)
-        self._samples[:, at + 1 : at + 1 + rest] = data[:, samples - rest :]
+        remainder, offset = (samples, offset) if not count else ((offset + samples) % window, 0)
+        self._samples[:, offset + 1 : offset + 1 + remainder] = data[:, samples - remainder :]
         if schedule is not None:
-            self._position[at : at + rest] = schedule[samples - rest :]
-        self._at, self._whole = at + rest, bool(complete[count])
+            self._position[offset : offset + remainder] = schedule[samples - remainder :]
+        self._at, self._whole = offset + remainder, bool(complete[count])
 
     def _signals(self, data: Floats, begin: int, end: int) -> Floats:
         """Samples from `begin` on, which may be before the data, with the one before them where it is needed."""
@@ -115,3 +118,121 @@ class PeriodCutter(StatefulBase):
     def _differences(self, signals: Floats) -> Floats:
         """Signals without the sample before them, some of them differenced."""
         return np.where(self._differenced, np.diff(signals), signals[:, 1:]) if self._lead else signals
+
+
+@dataclass(frozen=True, eq=False)
+class Moments:
+    """Weighted moments of line spectra, one row for each place in the period or each moment in time.
+
+    Numerator and denominator are those of the estimate, each times conj(reference). The weights are λ^i over the
+    windows i, the newest first.
+
+    Attributes
+    ----------
+    means, scatter
+        As those of `LineMoments`, shapes (10, rows, lines) and (4, rows, lines). Real and in one array, so that a
+        period is added in one pass.
+    weights
+        Σλ^i, Σλ^2i, Σλ^3i, each of shape (rows,).
+    """
+
+    means: Floats
+    scatter: Floats
+    weights: WeightSums
+
+    @property
+    def pair(self) -> Complex:
+        """Means of numerator and denominator, shape (2, rows, lines)."""
+        pair = np.empty((2, *self.means.shape[1:]), dtype=np.complex128)
+        pair.real, pair.imag = self.means[0:4:2], self.means[1:4:2]
+        return pair
+
+    @property
+    def repeatability(self) -> Floats:
+        """|S_r|²/S_rr: the share of the reference's power that its mean has, shape (rows, lines)."""
+        return np.asarray((self.means[4] ** 2 + self.means[5] ** 2) / self.means[6])
+
+    @property
+    def power(self) -> Floats:
+        """Means of the powers, shape (4, rows, lines)."""
+        return self.means[6:]
+
+    def unexplained(self, ratio: Complex) -> Floats:
+        """Σλ^i|δnum − ratio·δden|², shape (rows, lines)."""
+        numerator, denominator, re, im = self.scatter
+        shared = ratio.real * re + ratio.imag * im
+        total = numerator - 2 * shared + (ratio.real**2 + ratio.imag**2) * denominator
+        return np.asarray(np.maximum(total, 0.0))  # rounding can make it negative
+
+
+class PeriodMoments(StatefulBase):
+    """Running Moments: windows one period apart are one series, so that every hop has its own history.
+
+    Means and centred second moments are updated by deviations (West 1979), since sums of squares would lose the
+    scatter to rounding at a high signal-to-noise ratio.
+
+    Parameters
+    ----------
+    places
+        Windows in one period.
+    lines
+        Lines in one row.
+    forgetting
+        λ per period, 0 < λ ≤ 1; 1 remembers every period equally.
+
+    Attributes
+    ----------
+    weights
+        Sums of the forgetting weights.
+    """
+
+    _stage = Stage("period-moments", 1)
+    _STATE = ("_count", "_means", "_scatter", "_moment")
+
+    def __init__(self, places: int, lines: int, forgetting: float) -> None:
+        self.weights = weights_of(forgetting)
+        self._count = np.zeros(places, dtype=np.int64)
+        self._means = np.zeros((MEANS, places, lines))
+        self._scatter = np.zeros((SCATTER, places, lines))
+        self._moment = np.zeros((3, places))
+
+    @property
+    def arrays(self) -> LineMoments:
+        """The state, which the functions of the kernel change in place."""
+        return LineMoments(self._count, self._means, self._scatter, self._moment)
+
+    @property
+    def now(self) -> Moments:
+        """The moments at every place in the period."""
+        return Moments(self._means, self._scatter, self.weights.after(self._count))
+
+    def forget(self) -> None:
+        """Return to the state before the first window."""
+        for part in (self._count, self._means, self._scatter, self._moment):
+            part[:] = 0
+
+
+class Weights:
+    """Sums of the forgetting weights over c windows: Σλ^i, Σλ^2i, Σλ^3i for i < c.
+
+    Attributes
+    ----------
+    forgetting
+        λ.
+    table
+        The sums over 0, 1, 2 … windows, as many as change them, shape (3, any).
+    """
+
+    def __init__(self, forgetting: float) -> None:
+        self.forgetting = forgetting
+        # Number of windows above which the weight of another one is below rounding.
+        enough = 0 if forgetting == 1 else min(ceil(log(1e-17) / log(forgetting)), 1 << 20)
+        powers = np.cumprod(np.full((3, enough), forgetting ** np.array([[1.0], [2.0], [3.0]])), axis=1)
+        self.table = np.concatenate([np.zeros((3, 1)), np.ones((3, 1)), 1 + np.cumsum(powers, axis=1)], axis=1)
+
+    def after(self, count: NDArray[np.int64]) -> WeightSums:
+        """The sums over so many windows, shape of `count`."""
+        return WeightSums.after(count, self.forgetting, self.table)
+
+
+weights_of = lru_cache(maxsize=4)(Weights)

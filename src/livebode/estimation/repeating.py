@@ -13,9 +13,8 @@ from livebode.arrays import Complex, Flags, Floats
 from livebode.core import Block, Event, Lines, QuantityKind, Stage, step_of
 from livebode.estimation.hum import SilentHum, may_disturb
 from livebode.estimation.levels import DistortionLevels
-from livebode.estimation.moments import PeriodMoments
 from livebode.estimation.movement import PLACES, Movement
-from livebode.estimation.periods import PeriodCutter, Periods
+from livebode.estimation.periods import PeriodCutter, PeriodMoments, Periods
 from livebode.estimation.silence_search import HumSpan, SilenceSearch, SilentStretch, updated
 from livebode.estimation.spectra import SpectraRows
 from livebode.estimation.tracker_settings import Settings
@@ -27,7 +26,7 @@ _LOOKS_S = 2.0, 4.0, 8.0, 16.0  # of silence, after which it is searched: the la
 
 
 @dataclass(frozen=True, eq=False)
-class Repeating:
+class RepeatingVerdicts:
     """Verdicts on lines: before the first period of some samples, and after each that ends in them.
 
     Attributes
@@ -134,14 +133,14 @@ class RepeatingErrors(PeriodCutter):
     def finish(self, sample: int, time_s: float) -> None:
         """Report hum in the last silence, and the levels of even and odd distortion, at the end of the samples."""
         for stretch in self._search.interrupt():
-            self._take_silence(stretch, time_s)
+            self._process_silence(stretch, time_s)
         if message := self.levels.sentence():
             self._events.append(Event("distortion-levels", sample, time_s, message))
 
     def restart(self, sample: int, time_s: float) -> None:
         """The next sample has this number and this time and does not follow the previous one."""
         for stretch in self._search.interrupt():
-            self._take_silence(stretch, time_s)
+            self._process_silence(stretch, time_s)
         self._begin_at(sample)
         self.levels.end_stretch()
         self._moments.forget()
@@ -150,7 +149,7 @@ class RepeatingErrors(PeriodCutter):
 
     def process(
         self, data: Floats, rows: SpectraRows, schedule: Floats | None, block: Block, aside: NDArray[np.intp]
-    ) -> Repeating:
+    ) -> RepeatingVerdicts:
         """The verdicts for the windows of these rows.
 
         Parameters
@@ -169,17 +168,17 @@ class RepeatingErrors(PeriodCutter):
         left_out = np.concatenate([rows.not_finite, rows.implausible, rows.spikes, rows.left_out, aside])
         which = (rows.sample - block.start + self._at) // self._window  # so many periods end before
         kind = next((c.stated_kind for c in block.channels if c.name == self._settings.output), None)
-        begun, found = self._now, [self._verdicts(p, block, kind) for p in self._cut(data, schedule, left_out)]
-        if not found:
+        begun, verdicts = self._now, [self._verdicts(p, block, kind) for p in self._cut(data, schedule, left_out)]
+        if not verdicts:
             now = begun.distortion[np.newaxis], np.logical_or.reduce(begun.against, axis=0, keepdims=True)
-        elif len(found) == 1:
-            now = found[0].distortion, found[0].invalid
+        elif len(verdicts) == 1:
+            now = verdicts[0].distortion, verdicts[0].invalid
         else:
-            now = _joined([one.distortion for one in found]), _joined([one.invalid for one in found])
+            now = _joined([part.distortion for part in verdicts]), _joined([part.invalid for part in verdicts])
         hum = self._hum_of_windows(data, rows.sample, block, aside)
         if hum is None or not hum.any():
-            return Repeating(*now, which, self._dof)
-        return Repeating(now[0][which], now[1][which] | hum, np.arange(which.size), self._dof)
+            return RepeatingVerdicts(*now, which, self._dof)
+        return RepeatingVerdicts(now[0][which], now[1][which] | hum, np.arange(which.size), self._dof)
 
     def _hum_of_windows(
         self, data: Floats, sample: NDArray[np.int64], block: Block, aside: NDArray[np.intp]
@@ -188,19 +187,19 @@ class RepeatingErrors(PeriodCutter):
         if not self._searches:
             return None
         if self._spans is not None:
-            hum = np.zeros((sample.size, self._silent_hum.size), dtype=np.bool_)
+            of_spans = np.zeros((sample.size, self._silent_hum.size), dtype=np.bool_)
             for span in self._spans:
                 before_stop = True if span.stop is None else sample - self._window + 1 < span.stop
-                hum[:, span.line] |= (sample >= span.first) & before_stop
-            return hum
-        found: Flags | None = np.tile(self._silent_hum > 0, (sample.size, 1)) if self._silent_hum.any() else None
+                of_spans[:, span.line] |= (sample >= span.first) & before_stop
+            return of_spans
+        hum: Flags | None = np.tile(self._silent_hum > 0, (sample.size, 1)) if self._silent_hum.any() else None
         for stretch in self._search.process(data, data[self._reference], block.start, aside):
-            self._take_silence(stretch, block.origin_s + (stretch.stop - 1) / block.rate_hz)
-            found = np.zeros((sample.size, self._silent_hum.size), dtype=np.bool_) if found is None else found
-            found[sample >= stretch.stop] = self._silent_hum > 0
-        return found
+            self._process_silence(stretch, block.origin_s + (stretch.stop - 1) / block.rate_hz)
+            hum = np.zeros((sample.size, self._silent_hum.size), dtype=np.bool_) if hum is None else hum
+            hum[sample >= stretch.stop] = self._silent_hum > 0
+        return hum
 
-    def _take_silence(self, stretch: SilentStretch, time_s: float) -> None:
+    def _process_silence(self, stretch: SilentStretch, time_s: float) -> None:
         """What a silence shows; an Event for each line that it makes invalid, or valid again."""
         before, told = self._silent_hum > 0, self._told[HUM]
         self._silent_hum = updated(self._silent_hum, stretch, self._settings.lines, withdraw=not self._settings.average)
@@ -211,7 +210,7 @@ class RepeatingErrors(PeriodCutter):
             )
 
     def _verdicts(self, periods: Periods, block: Block, kind: QuantityKind | None) -> PeriodVerdicts:
-        """Those before and after each of these periods."""
+        """Verdicts before and after each of these periods."""
         with np.errstate(all="ignore"):  # an incomplete period is not used
             spectra = np.fft.rfft(periods.signals)
         now = PeriodSpectra(
@@ -226,14 +225,14 @@ class RepeatingErrors(PeriodCutter):
         )
         moments = self._moments.arrays
         state = PeriodState(self._largest, self._step, *moments[:3], self._output, *self._silence.arrays, self._told)
-        found, self._largest, self._step = self._judge.process(state, now)
-        self._now = Verdict(found.distortion[-1].copy(), found.against[-1].copy())
-        happened = found.happened.tolist()
+        verdicts, self._largest, self._step = self._judge.process(state, now)
+        self._now = Verdict(verdicts.distortion[-1].copy(), verdicts.against[-1].copy())
+        happened = verdicts.happened.tolist()
         if self.levels.bins.size:
-            self._take_levels(spectra, happened)
-        for period in (at for at, what in enumerate(happened) if what & NEWS):
-            self._report(found, period, block, block.start + periods.stop + period * self._window - 1, kind)
-        return found
+            self._add_levels(spectra, happened)
+        for period in (number for number, change in enumerate(happened) if change & NEWS):
+            self._report(verdicts, period, block, block.start + periods.stop + period * self._window - 1, kind)
+        return verdicts
 
     def _moves(self, periods: Periods) -> Flags:
         """In which periods the machine moves."""
@@ -242,25 +241,25 @@ class RepeatingErrors(PeriodCutter):
         looked = periods.schedule[:, self._looked]
         return np.asarray(self._movement.process(0, looked.ravel()).reshape(looked.shape).any(axis=1))
 
-    def _take_levels(self, spectra: Complex, happened: Sequence[int]) -> None:
-        for period, what in enumerate(happened):
-            if what & FORGOTTEN:
+    def _add_levels(self, spectra: Complex, happened: Sequence[int]) -> None:
+        for period, change in enumerate(happened):
+            if change & FORGOTTEN:
                 self.levels.end_stretch()
-            if what & ADDED:
+            if change & ADDED:
                 self.levels.process(spectra[:, period])
 
     def _report(
-        self, found: PeriodVerdicts, period: int, block: Block, sample: int, output: QuantityKind | None
+        self, verdicts: PeriodVerdicts, period: int, block: Block, sample: int, output: QuantityKind | None
     ) -> None:
         time_s, known = block.origin_s + sample / block.rate_hz, self._known_hum()
-        for i, at in zip(*np.nonzero(found.news[period])):
-            f = self._settings.lines.frequency_hz[at]
+        for i, line in zip(*np.nonzero(verdicts.news[period])):
+            f = self._settings.lines.frequency_hz[line]
             if i == HUM:
-                if not known[at]:
-                    gone = bool(found.news[period, i, at] == NEWS_GONE)
-                    self._events.append(hum_event(self._settings.lines, int(at), sample, time_s, gone=gone))
+                if not known[line]:
+                    gone = bool(verdicts.news[period, i, line] == NEWS_GONE)
+                    self._events.append(hum_event(self._settings.lines, int(line), sample, time_s, gone=gone))
                 continue
-            message, value = reason(found, period, int(i), int(at), f, output)
+            message, value = reason(verdicts, period, int(i), int(line), f, output)
             message, details = (
                 Message("{verdict}; the line is not valid", verdict=message),
                 {"line_hz": float(f)} | value,
@@ -280,13 +279,13 @@ def hum_event(lines: Lines, line: int, sample: int, time_s: float, *, gone: bool
 
 
 def hum_events(spans: Sequence[HumSpan], lines: Lines, begins: int) -> list[Event]:
-    """Those of the lines of a recording that is tracked from sample `begins` on."""
-    found = []
+    """Events of the lines of a recording that is tracked from sample `begins` on."""
+    events = []
     for span in spans:
         for sample, gone in ((max(span.first, begins), False), (span.stop, True)):
             if sample is not None:
-                found.append(hum_event(lines, span.line, sample, sample / lines.rate_hz, gone=gone))
-    return found
+                events.append(hum_event(lines, span.line, sample, sample / lines.rate_hz, gone=gone))
+    return events
 
 
 def _joined(rows: Sequence[NDArray[Any]]) -> NDArray[Any]:

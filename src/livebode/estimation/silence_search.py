@@ -111,12 +111,12 @@ class SilenceSearch(StatefulBase):
         self._newest = np.nan
 
     def _extend(self, data: Floats, stop: int) -> Iterator[SilentStretch]:
-        at, samples = 0, data.shape[1]
-        while at < samples:
+        offset, samples = 0, data.shape[1]
+        while offset < samples:
             until = next(look for look in self._looks if look > self._size)
-            taken = min(samples - at, until - self._size)
-            self._parts.append(data[:, at : at + taken].copy())
-            at, self._size, self._stop = at + taken, self._size + taken, stop - samples + at + taken
+            taken = min(samples - offset, until - self._size)
+            self._parts.append(data[:, offset : offset + taken].copy())
+            offset, self._size, self._stop = offset + taken, self._size + taken, stop - samples + offset + taken
             if self._size == self._looks[-1]:
                 yield from self._end()
                 self._later = True
@@ -139,10 +139,10 @@ def updated(shortest: Floats, stretch: SilentStretch, lines: Lines, *, withdraw:
 
     Hum is withdrawn where a stretch does not show it that is four times as long: it would show a quarter of its power.
     """
-    found = disturbed_lines(stretch.tones, lines).any(axis=0)
+    disturbed = disturbed_lines(stretch.tones, lines).any(axis=0)
     known = np.where(shortest > 0, np.minimum(shortest, stretch.samples), stretch.samples)
     gone = withdraw & stretch.ends & (shortest <= GONE * stretch.samples)
-    return np.asarray(np.where(found, known, np.where(gone, 0.0, shortest)))
+    return np.asarray(np.where(disturbed, known, np.where(gone, 0.0, shortest)))
 
 
 @dataclass(frozen=True, eq=False)

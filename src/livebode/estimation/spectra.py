@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Floats
 from livebode.core import GridError, Lines, Stage, StatefulBase, UsageError
-from livebode.estimation.spikes import PlausibleRange, SpikeGate
+from livebode.estimation.implausible import PlausibleRange, SpikeGate
 from livebode.kernel import INSTRUCTION_SET_VARIABLE, SlidingDFT, instruction_set, instruction_sets
 
 _NONE = np.zeros(0, dtype=np.intp)
@@ -192,9 +192,9 @@ class LineSpectra(StatefulBase):
         return np.asarray(self._next + position - last_bad >= self._window)
 
 
-def _joined(one: NDArray[np.intp], other: NDArray[np.intp]) -> NDArray[np.intp]:
-    """One after the other; nearly always there are none."""
-    return np.concatenate([one, other]) if other.size else one
+def _joined(first: NDArray[np.intp], second: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Positions joined in order; the second are nearly always none."""
+    return np.concatenate([first, second]) if second.size else first
 
 
 def after(bins: NDArray[np.int64], window: int, differenced: NDArray[np.bool_], advanced: NDArray[np.int64]) -> Complex:
@@ -249,9 +249,9 @@ class Hann:
                 resolution_hz=lines.resolution_hz,
             )
         self._window = lines.window
-        at = np.asarray(lines.bins)
-        self.bins = np.unique(np.concatenate([at - 1, at, at + 1]))
-        self._at = np.searchsorted(self.bins, at)
+        lines_bins = np.asarray(lines.bins)
+        self.bins = np.unique(np.concatenate([lines_bins - 1, lines_bins, lines_bins + 1]))
+        self._at = np.searchsorted(self.bins, lines_bins)
 
     def combine(self, spectrum: Complex, place: NDArray[np.int64]) -> Complex:
         """Windowed lines (channels, rows, lines) from spectra (channels, rows, bins) on the fixed phase grid.

@@ -28,10 +28,10 @@ from livebode.core import (
     hand_over,
     ignore,
 )
+from livebode.estimation.implausible import PlausibleRange
 from livebode.estimation.line_stage import LineStage
 from livebode.estimation.ripple import HopSpeed, ripple_power
 from livebode.estimation.spectra import SpectraRows, after
-from livebode.estimation.spikes import PlausibleRange
 from livebode.estimation.stream_estimator import StreamCounters, StreamEstimator
 from livebode.estimation.tracker_settings import Settings
 from livebode.language import Message
@@ -263,29 +263,29 @@ class SpectraTracker(StreamEstimator[SpectraInputStatistics]):
             others, whose spectrum is not finite, implausible or not the next one, have not changed: they need
             `process`.
         """
-        one = trackers[0]
-        layout, settings = one._layout, one.settings
-        sums = spectra.sums.take(one._signals, axis=0).take(one._columns, axis=2)
+        example = trackers[0]
+        layout, settings = example._layout, example.settings
+        sums = spectra.sums.take(example._signals, axis=0).take(example._columns, axis=2)
         with np.errstate(over="ignore", invalid="ignore"):
-            spectrum = sums * one._after
+            spectrum = sums * example._after
             size = np.abs(spectrum).max(axis=2).T
         plausible, every = PlausibleRange.are_plausible([tracker._range for tracker in trackers], size)
         follows = [tracker._watch.continues_at(n) for tracker, n in zip(trackers, spectra.start.tolist())]
         taken = plausible & np.isfinite(size).all(axis=1) & np.array(follows)
-        at = np.flatnonzero(taken)
-        usual = [trackers[i] for i in at.tolist()]
+        rows = np.flatnonzero(taken)
+        usual = [trackers[i] for i in rows.tolist()]
         if not usual:
             return None, taken
-        sample, window = spectra.start[at] - 1 + layout.hop, layout.window
+        sample, window = spectra.start[rows] - 1 + layout.hop, layout.window
         time_s = 0.0 + (sample - (window - 1) / 2) / spectra.rate_hz
-        schedule = np.full(len(at), np.nan)
+        schedule = np.full(len(rows), np.nan)
         if settings.schedule:
             names = [channel.name for channel in layout.values]
-            schedule = spectra.values[names.index(settings.schedule), at]
+            schedule = spectra.values[names.index(settings.schedule), rows]
         stages = [tracker._lines for tracker in usual]
-        centre, place = np.stack([time_s, schedule]), spectra.place[at]
-        responses = LineStage.process_each(stages, spectrum[:, at], sample, place, centre, spectra.channels)
-        PlausibleRange.process_each([tracker._range for tracker in usual], every[at])
+        centre, place = np.stack([time_s, schedule]), spectra.place[rows]
+        responses = LineStage.process_each(stages, spectrum[:, rows], sample, place, centre, spectra.channels)
+        PlausibleRange.process_each([tracker._range for tracker in usual], every[rows])
         for tracker in usual:
             tracker._watch.count_whole(layout.hop)
             tracker._ends_with(responses)

@@ -114,9 +114,9 @@ class InputStatistics(StreamCounters):
 
     def count(self, block: Block, rows: SpectraRows) -> None:
         """Count the excluded samples; one Event for all that are within a window of each other."""
-        found = {"non-finite": rows.not_finite, "implausible": rows.implausible, "spike": rows.spikes}
+        excluded = {"non-finite": rows.not_finite, "implausible": rows.implausible, "spike": rows.spikes}
         new: list[tuple[int, str]] = []
-        for kind, position in found.items():
+        for kind, position in excluded.items():
             if not position.size:
                 continue
             self.counts[kind] += position.size
@@ -127,10 +127,10 @@ class InputStatistics(StreamCounters):
         for sample, kind in sorted(new):
             self._exclude(kind, block, sample, _KINDS[kind])
 
-    def _exclude(self, kind: str, block: Block, sample: int, what: str, **details: int) -> None:
+    def _exclude(self, kind: str, block: Block, sample: int, cause: str, **details: int) -> None:
         message = Message(
             "{what}; responses are invalid until a window of {window} samples is complete again",
-            what=what,
+            what=cause,
             window=self._window,
         )
         self._report(kind, block, sample, message, **details)
@@ -236,7 +236,7 @@ def signals_of(block: Block, settings: Settings) -> tuple[Floats, Floats | None]
 
 
 def _rows(data: Floats, which: list[int]) -> Floats:
-    """These rows; no copy where they are contiguous and evenly spaced, as three channels in the usual orders are."""
+    """Rows of these channels; no copy where they are evenly spaced, as three channels in the usual orders are."""
     first, step = which[0], which[1] - which[0] if len(which) > 1 else 1
     if step == 0 or data.strides[1] != data.itemsize or which != list(range(first, first + step * len(which), step)):
         return data[which]

@@ -105,12 +105,12 @@ class UnevenSpectra:
 
     def _sums(self, turns: Floats, x: Floats) -> Complex:
         known = np.isfinite(x)
-        one, values = known.astype(np.float64), np.where(known, x, 0.0)
-        parts = [one, values]
+        weights, values = known.astype(np.float64), np.where(known, x, 0.0)
+        parts = [weights, values]
         if self._rows == 5:
             # A segment begins half a sample before its first one on the common grid.
             u = ((turns + 0.5 / self._window) * self._places) % 1.0 - 0.5
-            parts += [one * u, one * u * u, values * u]
+            parts += [weights * u, weights * u * u, values * u]
         rows = np.stack(parts, axis=1)
         turn = np.exp(2j * np.pi * (turns % 1.0))
         fine = turn[:, np.newaxis] ** np.arange(_TABLE)
@@ -121,39 +121,39 @@ class UnevenSpectra:
     def window(self, segments: Complex) -> UnevenWindow:
         """The spectra of a window from the sums of its segments in order, (places, channels, rows, orders)."""
         sums = self._together(segments)
-        found = np.zeros((len(sums), self._k.size + self._q.size), dtype=np.complex128)
+        spectra = np.zeros((len(sums), self._k.size + self._q.size), dtype=np.complex128)
         inflation = np.full((len(sums), self._k.size), np.inf)
         samples = np.rint(sums[:, _ONE, 0].real).astype(np.int64)
         solved: dict[tuple[bytes, bool], Floats | None] = {}
-        for at, (own, trend) in enumerate(zip(sums, self._trend)):
+        for row, (own, trend) in enumerate(zip(sums, self._trend)):
             key = own[[_ONE, *([_U, _UU] if trend else [])]].tobytes(), bool(trend)
             if key not in solved:
                 solved[key] = self._covariance(own, bool(trend))
             inverse = solved[key]
             if inverse is not None:
-                found[at], inflation[at] = self._solve(own, bool(trend), inverse)
-        return UnevenWindow(found, inflation, samples)
+                spectra[row], inflation[row] = self._solve(own, bool(trend), inverse)
+        return UnevenWindow(spectra, inflation, samples)
 
     def _together(self, segments: Complex) -> Complex:
         """Sums over the window, with the trend's time from its centre in windows."""
         sums = segments.sum(axis=0)
         if self._rows == 5:
             shift = (np.arange(self._places) - (self._places - 1) / 2)[:, np.newaxis, np.newaxis]
-            one, x, u, uu, xu = np.moveaxis(segments, 2, 0)
-            sums[:, _U] = (u + shift * one).sum(axis=0) / self._places
+            weights, x, u, uu, xu = np.moveaxis(segments, 2, 0)
+            sums[:, _U] = (u + shift * weights).sum(axis=0) / self._places
             sums[:, _XU] = (xu + shift * x).sum(axis=0) / self._places
-            sums[:, _UU] = (uu + 2 * shift * u + shift**2 * one).sum(axis=0) / self._places**2
+            sums[:, _UU] = (uu + 2 * shift * u + shift**2 * weights).sum(axis=0) / self._places**2
         return np.asarray(sums)
 
     def _covariance(self, sums: Complex, trend: bool) -> Floats | None:
         """Inverse of the normal matrix of constant, trend, cosines and sines; None where it is singular."""
-        one = sums[_ONE]
-        c_minus, c_plus = one.real[self._at[np.abs(self._minus)]], one.real[self._at[self._plus]]
-        s_minus = np.sign(self._minus) * one.imag[self._at[np.abs(self._minus)]]
-        s_plus = one.imag[self._at[self._plus]]
+        weights = sums[_ONE]
+        c_minus, c_plus = weights.real[self._at[np.abs(self._minus)]], weights.real[self._at[self._plus]]
+        s_minus = np.sign(self._minus) * weights.imag[self._at[np.abs(self._minus)]]
+        s_plus = weights.imag[self._at[self._plus]]
         first, lines = 1 + trend, self._k.size
         size = first + 2 * lines
-        if one[0].real < size:
+        if weights[0].real < size:
             return None
         normal = np.empty((size, size))
         cos, sin = slice(first, first + lines), slice(first + lines, None)
@@ -161,7 +161,7 @@ class UnevenSpectra:
         normal[cos, sin] = (s_plus - s_minus) / 2
         head = self._head(sums, trend)
         normal[:first, cos], normal[:first, sin] = head[:, self._at[self._k]].real, head[:, self._at[self._k]].imag
-        normal[0, 0] = one[0].real
+        normal[0, 0] = weights[0].real
         if trend:
             normal[0, 1], normal[1, 1] = sums[_U, 0].real, sums[_UU, 0].real
         normal = np.triu(normal) + np.triu(normal, 1).T
@@ -177,9 +177,9 @@ class UnevenSpectra:
 
     def _solve(self, sums: Complex, trend: bool, inverse: Floats) -> tuple[Complex, Floats]:
         first, lines = 1 + trend, self._k.size
-        at = self._at[self._k]
+        columns = self._at[self._k]
         ends = sums[[_X, _XU][:first], 0].real
-        answer = np.concatenate([ends, sums[_X, at].real, sums[_X, at].imag])
+        answer = np.concatenate([ends, sums[_X, columns].real, sums[_X, columns].imag])
         solution = inverse @ answer
         line = (solution[first : first + lines] - 1j * solution[first + lines :]) / 2
         spread = np.diag(inverse)[first:].reshape(2, lines).sum(axis=0) / 4
@@ -190,15 +190,15 @@ class UnevenSpectra:
         """Sums of the residual at the detection lines, scaled to unit variance for white noise of unit variance."""
         if not self._q.size:
             return np.zeros(0, dtype=np.complex128)
-        one, k = sums[_ONE], self._k[:, np.newaxis]
-        minus = one[self._at[np.abs(k - self._q)]]
+        weights, k = sums[_ONE], self._k[:, np.newaxis]
+        minus = weights[self._at[np.abs(k - self._q)]]
         minus = np.where(k < self._q, minus.conj(), minus)
-        plus = one[self._at[k + self._q]].conj()
+        plus = weights[self._at[k + self._q]].conj()
         head = self._head(sums, trend)[:, self._at[self._q]].conj()
         basis = np.concatenate([head, (minus + plus) / 2, (minus - plus) / 2j])
-        rest = sums[_X, self._at[self._q]].conj() - solution @ basis
-        left = one[0].real - np.einsum("pq,pr,rq->q", basis.conj(), inverse, basis).real
-        return np.asarray(rest / np.sqrt(np.maximum(left, 1.0)))
+        residual = sums[_X, self._at[self._q]].conj() - solution @ basis
+        left = weights[0].real - np.einsum("pq,pr,rq->q", basis.conj(), inverse, basis).real
+        return np.asarray(residual / np.sqrt(np.maximum(left, 1.0)))
 
     def windows(self, segments: Iterator[Complex], first: int, every: int) -> Iterator[UnevenWindow]:
         """The windows that end with every `every`-th segment, of consecutive segments from number `first` on."""

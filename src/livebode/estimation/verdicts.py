@@ -1,4 +1,4 @@
-"""Verdicts on lines from the mean over periods: distortion, estimated at detection lines, mains hum, sensor steps."""
+"""Verdicts on lines from the mean over periods: distortion, by detection lines; mains hum; sensor steps."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ from livebode.arrays import Complex, Flags, Floats
 from livebode.core import Lines, QuantityKind, f_quantile
 from livebode.estimation.detection import Groups, Interpolation
 from livebode.estimation.hum import Neighbours, mains_of
-from livebode.estimation.moments import Moments, divided, power, times
+from livebode.estimation.periods import Moments
+from livebode.estimation.products import divided, power, times
 from livebode.estimation.spectra import after
 from livebode.estimation.tracker_settings import Role, Settings
 from livebode.kernel import (
@@ -79,10 +80,10 @@ class Distortion:
     """
 
     def __init__(self, lines: Lines) -> None:
-        at = np.asarray(lines.bins)
+        bins = np.asarray(lines.bins)
         self.bins = reached(lines)
-        self.interpolation = Interpolation(at, self.bins)
-        self.groups = Groups(at, self.bins)
+        self.interpolation = Interpolation(bins, self.bins)
+        self.groups = Groups(bins, self.bins)
         self.dof = float(self.groups.dof.min())
 
     def repeats(
@@ -114,13 +115,13 @@ class Distortion:
             mean = np.where(excited, np.nan, mean)
         as_output = self.groups.at(mean - noise)
         as_input = self.groups.at((mean - noise) / power(model)) * power(ratio)
-        found = np.maximum(np.fmax(as_output, as_input), 0.0) + 0.0  # which zero a maximum is, is not specified
+        repeating = np.maximum(np.fmax(as_output, as_input), 0.0) + 0.0  # which zero a maximum is, is not specified
         strength = power(numerator[:, lines])
         stronger = np.maximum(strength / _mean(strength), 1.0)
-        coherent = (_COHERENT**2 * stronger - 1) * np.maximum(found - _STEPS_MARGIN * steps, 0.0)
+        coherent = (_COHERENT**2 * stronger - 1) * np.maximum(repeating - _STEPS_MARGIN * steps, 0.0)
         known = np.isfinite(mean) & np.isfinite(noise)
         over = _over_noise(mean, noise, known)
-        variance = _share(over)[:, np.newaxis] * (found + coherent)
+        variance = _share(over)[:, np.newaxis] * (repeating + coherent)
         return Repeats(variance, over, np.count_nonzero(known, axis=1), moments.weights.dof)
 
 
@@ -154,13 +155,13 @@ def _over_noise(mean: Floats, noise: Floats, known: NDArray[np.bool_]) -> Floats
     ratio = np.divide(mean, smooth, out=np.full(mean.shape, np.inf), where=smooth > 0)
     if known.all():
         return np.asarray(ratio.mean(axis=1))
-    return np.array([row[at].mean() if at.any() else 0.0 for row, at in zip(ratio, known)])
+    return np.array([row[detected].mean() if detected.any() else 0.0 for row, detected in zip(ratio, known)])
 
 
 def _summed(rows: Floats) -> Floats:
     """Sum over five neighbouring detection lines, fewer at the ends."""
     padded = np.pad(rows, ((0, 0), (_SMOOTH // 2, _SMOOTH // 2)))
-    shifted = (padded[:, at : at + rows.shape[1]] for at in range(_SMOOTH))
+    shifted = (padded[:, offset : offset + rows.shape[1]] for offset in range(_SMOOTH))
     return np.asarray(sum(shifted, start=np.zeros_like(rows)))
 
 
@@ -191,7 +192,7 @@ _JUDGED_PER_S = 10  # times at most; for short periods a verdict in each period 
 
 @dataclass(frozen=True, eq=False)
 class Verdict:
-    """What is known of the lines after a period.
+    """Verdicts on the lines after a period.
 
     Attributes
     ----------
@@ -210,10 +211,12 @@ class Verdict:
         return cls(np.full(lines, np.nan), np.zeros((REASONS, lines), dtype=np.bool_))
 
 
-def reason(found: PeriodVerdicts, period: int, kind: int, at: int, f: float, output: QuantityKind | None) -> Reason:
+def reason(
+    verdicts: PeriodVerdicts, period: int, kind: int, line: int, f: float, output: QuantityKind | None
+) -> Reason:
     """Why the line with this number and frequency is invalid since a period: for a message, and its details."""
     if KINDS[kind] == "steps":
-        counts = float(found.steps[period, at])
+        counts = float(verdicts.steps[period, line])
         message = Message(
             "the output moves only {steps:.2g} steps of its sensor at {line_hz:g} Hz: increase the excitation",
             steps=counts,
@@ -222,8 +225,8 @@ def reason(found: PeriodVerdicts, period: int, kind: int, at: int, f: float, out
         if output == "other":
             message = Message("{few}; if the output is a velocity, declare it in source.kinds", few=message)
         return message, {"steps": counts}
-    numerator, denominator = found.pair[period, :, at]
-    share = float(found.distortion[period + 1, at] / np.abs(numerator / denominator))
+    numerator, denominator = verdicts.pair[period, :, line]
+    share = float(verdicts.distortion[period + 1, line] / np.abs(numerator / denominator))
     message = Message(
         "distortion may be {percent:.0f}% of the response at {line_hz:g} Hz (friction, backlash or sensor steps; "
         "increase the excitation, or move the axis)",

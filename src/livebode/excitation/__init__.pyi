@@ -2,6 +2,7 @@ from livebode.excitation._chirp import Sweep as Sweep
 from livebode.excitation._chirp import chirp as chirp
 from livebode.excitation._chirp import chirp_lines as chirp_lines
 from livebode.excitation._extent import extent as extent
+from livebode.excitation._medians import medians as medians
 from livebode.excitation._multisine import Phases as Phases
 from livebode.excitation._multisine import each as each
 from livebode.excitation._multisine import multisine as multisine
@@ -16,13 +17,16 @@ from livebode.excitation._recognise import Excitation as Excitation
 from livebode.excitation._recognise import lines_of_window as lines_of_window
 from livebode.excitation._recognise import recognise as recognise
 from livebode.excitation.blocks import cut as cut
-from livebode.excitation.blocks import medians as medians
 from livebode.excitation.low_crest import crest_between_samples as crest_between_samples
 from livebode.excitation.low_crest import low_crest_phases as low_crest_phases
+from livebode.excitation.matrix import MatrixExcitation as MatrixExcitation
+from livebode.excitation.matrix import MatrixPrediction as MatrixPrediction
 from livebode.excitation.odd import check_band as check_band
 from livebode.excitation.odd import odd_bins as odd_bins
 from livebode.excitation.odd import odd_lines as odd_lines
 from livebode.excitation.period import find_period as find_period
+from livebode.excitation.plc_block import BLOCK_PERIOD_MAX as BLOCK_PERIOD_MAX
+from livebode.excitation.plc_block import function_block as function_block
 from livebode.excitation.prepare import checked as checked
 from livebode.excitation.prepare import clipped as clipped
 from livebode.excitation.prepare import filled as filled

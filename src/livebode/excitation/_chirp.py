@@ -54,14 +54,14 @@ def chirp(
             allowed=["linear", "logarithmic"],
         )
     low, high = low_hz * window / rate_hz, high_hz * window / rate_hz  # turns in a window
-    at = np.arange(window) / window
+    share = np.arange(window) / window
     if sweep == "linear":
         first = round(low)
-        turns = first * at + round((high - first) / 2) * at**2
+        turns = first * share + round((high - first) / 2) * share**2
     else:
         ratio = np.log(high / low)
         whole = max(1, round((high - low) / ratio))
-        turns = whole * np.expm1(ratio * at) / np.expm1(ratio)
+        turns = whole * np.expm1(ratio * share) / np.expm1(ratio)
     return np.asarray(amplitude * np.sin(2 * np.pi * turns))
 
 

@@ -51,8 +51,8 @@ def _border(x: Floats, typical: Floats, silent: int) -> int:
     silence_level = float(np.median(x[: silent * period])) if silent else runs_level
     silence, runs = (part - silence_level) ** 2, (part - runs_level - expected) ** 2
     gain = np.concatenate(([0.0], np.cumsum(silence - runs)))
-    at = int(np.argmin(gain))
+    index = int(np.argmin(gain))
     # Silence must fit clearly: half the squares of the excitation's, not a few samples near its zero.
-    clear = np.sum(silence[:at]) <= 0.5 * np.sum(runs[:at])
-    border = first + at if clear else first
+    clear = np.sum(silence[:index]) <= 0.5 * np.sum(runs[:index])
+    border = first + index if clear else first
     return border if border >= _SHORTEST * period else 0

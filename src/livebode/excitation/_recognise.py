@@ -1,4 +1,4 @@
-"""Detection of the excitation in a recording, with its crest factor and signal-to-noise ratio."""
+"""Detection of the excitation in a recording, its crest factor and signal-to-noise ratio."""
 
 from __future__ import annotations
 
@@ -18,19 +18,6 @@ from livebode.excitation.prepare import checked, clipped, filled
 from livebode.excitation.significance import FLOOR_DB, GAP_DB, BinClasses, find_lines
 from livebode.excitation.slips import Slip, find_slips, realigned
 from livebode.excitation.transient import leading, unlike
-
-
-def peak_and_rms(period: NDArray[np.float64]) -> tuple[float, float]:
-    """Largest magnitude and rms of the AC part of one period, shape (samples,); their quotient is the crest factor.
-
-    The offset is ignored: it neither excites nor can be separated from that of the sensor. Between samples the signal
-    may have higher peaks (negligible for lines far below the Nyquist frequency).
-
-    >>> peak_and_rms(np.array([4.0, 2.0, 4.0, 2.0]))
-    (1.0, 1.0)
-    """
-    ac = period - period.mean()
-    return float(np.max(np.abs(ac))), float(np.sqrt(np.mean(ac**2)))
 
 
 def snr_db(periods: NDArray[np.complex128]) -> NDArray[np.float64]:
@@ -53,6 +40,19 @@ def snr_db(periods: NDArray[np.complex128]) -> NDArray[np.float64]:
     variance = np.sum(np.abs(periods - mean) ** 2, axis=0) / (count - 1)
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.asarray(10 * np.log10(np.abs(mean) ** 2 / variance))
+
+
+def peak_and_rms(period: NDArray[np.float64]) -> tuple[float, float]:
+    """Largest magnitude and rms of the AC part of one period, shape (samples,); their quotient is the crest factor.
+
+    The offset is ignored: it neither excites nor can be separated from that of the sensor. Between samples the signal
+    may have higher peaks (negligible for lines far below the Nyquist frequency).
+
+    >>> peak_and_rms(np.array([4.0, 2.0, 4.0, 2.0]))
+    (1.0, 1.0)
+    """
+    ac = period - period.mean()
+    return float(np.max(np.abs(ac))), float(np.sqrt(np.mean(ac**2)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,21 +187,21 @@ def recognise(
         replies, also = _periods(answer[view], period, roughly)
         strange = strange | also
     steady = ~strange if np.sum(~strange) >= 2 else np.ones(len(blocks), dtype=np.bool_)
-    found = separate_hum(find_lines(spectra(blocks[steady]), floor_db, gap_db, step), rate_hz / period)
-    found = with_lines_beside(found, rate_hz / period)
+    classes = separate_hum(find_lines(spectra(blocks[steady]), floor_db, gap_db, step), rate_hz / period)
+    classes = with_lines_beside(classes, rate_hz / period)
     ratio_db = None if replies is None else snr_db(spectra(replies[steady]))
     if ratio_db is not None:
-        found = without_junk(found, ratio_db)
+        classes = without_junk(classes, ratio_db)
     if not doubtful:
-        refuse_if_doubtful(found, period, rate_hz)
-    if not found.excited.any():
+        refuse_if_doubtful(classes, period, rate_hz)
+    if not classes.excited.any():
         raise _no_line(period, len(blocks))
     peak, rms = peak_and_rms(blocks[steady].mean(axis=0))
     ahead = leading(strange)
     return Excitation(
-        lines=_lines(found, period, rate_hz),
-        amplitude=found.amplitude[found.excited],
-        distortion=_numbers(found.distortion),
+        lines=_lines(classes, period, rate_hz),
+        amplitude=classes.amplitude[classes.excited],
+        distortion=_numbers(classes.distortion),
         rms=rms,
         peak=peak,
         periods=len(blocks),
@@ -210,7 +210,7 @@ def recognise(
         transient=tuple(range(ahead)),
         outlying=tuple(m for m in _numbers(strange) if m >= ahead),
         slips=slips,
-        snr_db=None if ratio_db is None else ratio_db[found.excited],
+        snr_db=None if ratio_db is None else ratio_db[classes.excited],
     )
 
 
@@ -249,10 +249,10 @@ def lines_of_window(excitation: ArrayLike, window: int, rate_hz: float) -> Lines
             window=window,
         )
     start, stop = extent(clipped(x), window)
-    found = find_lines(spectra(cut(clipped(x[start:stop]), window)), step=step_of(x))
-    if not found.excited.any():
+    classes = find_lines(spectra(cut(clipped(x[start:stop]), window)), step=step_of(x))
+    if not classes.excited.any():
         raise _no_line(window, x.size // window)
-    return _lines(found, window, rate_hz)
+    return _lines(classes, window, rate_hz)
 
 
 def _no_line(period: int, periods: int) -> SignalError:
@@ -301,9 +301,9 @@ def _periods(samples: Floats, period: int, lines: Flags) -> tuple[Floats, Flags]
     return blocks, strange
 
 
-def _lines(found: BinClasses, period: int, rate_hz: float) -> Lines:
-    bins = _numbers(found.excited)
-    taken = found.excited | found.distortion
+def _lines(classes: BinClasses, period: int, rate_hz: float) -> Lines:
+    bins = _numbers(classes.excited)
+    taken = classes.excited | classes.distortion
     quiet = tuple(k for k in range(bins[0], bins[-1]) if not taken[k])
     return Lines(bins, period, rate_hz, quiet)
 

@@ -1,4 +1,4 @@
-"""A recording cut into its periods, and their medians."""
+"""A recording cut into its periods."""
 
 from __future__ import annotations
 
@@ -6,17 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Floats
-
-
-def medians(x: Floats, axis: int) -> Floats:
-    """`np.median(x, axis)` of a non-empty two-dimensional array, to the bit: NaN where a value is NaN."""
-    # NumPy's median partitions, without vector instructions; it sorts with them: 64 periods in an eighth of the time.
-    ordered = np.sort(np.ascontiguousarray(x.T) if axis == 0 else x, axis=1)
-    middle = ordered.shape[1] // 2
-    found = ordered[:, middle]
-    if not ordered.shape[1] % 2:
-        found = (ordered[:, middle - 1] + found) / 2
-    return np.where(np.isnan(ordered[:, -1]), np.nan, found)
+from livebode.excitation._medians import medians
 
 
 def cut(x: Floats, period: int) -> Floats:
@@ -35,11 +25,11 @@ def cut(x: Floats, period: int) -> Floats:
     if count > 1:
         slope[-1] = slope[-2]
     before = np.concatenate((slope[:1], slope[:-1]))
-    at = (np.arange(period) + 0.5) / period - 0.5  # position about the middle of the period
-    middle = np.searchsorted(at, 0.0)
+    position = (np.arange(period) + 0.5) / period - 0.5  # position about the middle of the period
+    middle = np.searchsorted(position, 0.0)
     drift = np.empty_like(blocks)
-    np.multiply.outer(before, at[:middle], out=drift[:, :middle])
-    np.multiply.outer(slope, at[middle:], out=drift[:, middle:])
+    np.multiply.outer(before, position[:middle], out=drift[:, :middle])
+    np.multiply.outer(slope, position[middle:], out=drift[:, middle:])
     drift += level[:, np.newaxis]
     np.subtract(blocks, drift, out=drift)
     drift -= typical.mean()

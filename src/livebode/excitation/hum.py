@@ -39,48 +39,52 @@ def without_mains(calm: Floats, period: int, rate_hz: float, step: float) -> int
     step
         The samples are multiples of it; 0 for none.
     """
-    found = with_lines_beside(find_lines(spectra(cut(calm, period)), step=step), rate_hz / period)
-    bins = np.flatnonzero(found.excited)
+    classes = with_lines_beside(find_lines(spectra(cut(calm, period)), step=step), rate_hz / period)
+    bins = np.flatnonzero(classes.excited)
     if not bins.size:
         return period
-    level, resolution_hz = found.amplitude[bins], rate_hz / period
+    level, resolution_hz = classes.amplitude[bins], rate_hz / period
     at_mains = [(mains_hz, _at_harmonics(bins, resolution_hz, mains_hz)) for mains_hz in MAINS_HZ]
     for shorter in (divisor for divisor in range(1, period) if period % divisor == 0):
         on = bins % (period // shorter) == 0
         if on.all():
             return shorter
-        hum = [hz for hz, at in at_mains if at[~on].all() and np.min(bins[~on]) * resolution_hz < hz * _BELOW_ORDER]
+        hum = [
+            hz
+            for hz, harmonic in at_mains
+            if harmonic[~on].all() and np.min(bins[~on]) * resolution_hz < hz * _BELOW_ORDER
+        ]
         if on.any() and hum and _weaker(level[~on], level[on]):
             return shorter
     return period
 
 
-def separate_hum(found: BinClasses, resolution_hz: float) -> BinClasses:
+def separate_hum(classes: BinClasses, resolution_hz: float) -> BinClasses:
     """Count weak lines at harmonics of the mains as distortion, if all lines, or those beside, are much stronger."""
-    bins = np.flatnonzero(found.excited)
+    bins = np.flatnonzero(classes.excited)
     if not bins.size:
-        return found
-    level = found.amplitude[bins]
+        return classes
+    level = classes.amplitude[bins]
     for mains_hz in MAINS_HZ:
-        at = _at_harmonics(bins, resolution_hz, mains_hz)
-        weak = at & (level <= _FAR_BELOW * level.max())
+        harmonic = _at_harmonics(bins, resolution_hz, mains_hz)
+        weak = harmonic & (level <= _FAR_BELOW * level.max())
         if weak.any() and level[weak].max() > _FAR_BELOW * level[~weak].min():
             weak[:] = False
-        weak |= at & (level <= _BELOW_BESIDE * _beside(level, at))
+        weak |= harmonic & (level <= _BELOW_BESIDE * _beside(level, harmonic))
         order = np.rint(bins[weak] * resolution_hz / mains_hz)
         if np.any(order <= _ORDER_MAX):
-            hum = np.isin(np.arange(found.excited.size), bins[weak])
-            return replace(found, excited=found.excited & ~hum, distortion=found.distortion | hum)
-    return found
+            hum = np.isin(np.arange(classes.excited.size), bins[weak])
+            return replace(classes, excited=classes.excited & ~hum, distortion=classes.distortion | hum)
+    return classes
 
 
 def _at_harmonics(bins: NDArray[np.intp], resolution_hz: float, mains_hz: float) -> NDArray[np.bool_]:
     return meets_mains(bins, resolution_hz, (mains_hz,), _NEAR_BINS + _MAINS_DRIFT * bins)
 
 
-def _beside(level: Floats, at: NDArray[np.bool_]) -> Floats:
-    """Of each line the weaker one of its neighbours that are not at the mains; 0 without one on both sides."""
-    others = np.flatnonzero(~at)
+def _beside(level: Floats, harmonic: NDArray[np.bool_]) -> Floats:
+    """Level of the weaker neighbour of each line, of those that are not at the mains; 0 without one on both sides."""
+    others = np.flatnonzero(~harmonic)
     after = np.searchsorted(others, np.arange(level.size))
     inside = (after > 0) & (after < others.size)
     weaker = np.zeros(level.size)

@@ -1,4 +1,4 @@
-"""The period of a recording, or the reason why it has none; whether it is periodic or only appears to be."""
+"""The period of a recording, or the reason why it has none; periods that a shorter lag hides."""
 
 from __future__ import annotations
 
@@ -7,14 +7,156 @@ from math import gcd
 import numpy as np
 
 from livebode.arrays import Floats
-from livebode.core import ANY_EXCITATION, SignalError
+from livebode.core import ANY_EXCITATION, SignalError, fast_length
 from livebode.excitation._extent import extent
 from livebode.excitation.blocks import cut, grouped, spectra
+from livebode.excitation.doubtful import with_lines_beside
 from livebode.excitation.hum import without_mains
-from livebode.excitation.longer import longer_period
 from livebode.excitation.prepare import clipped, whitened
-from livebode.excitation.repetition import LAG_MIN, ROUNDING, best_lag, difference
 from livebode.excitation.significance import FALSE_ALARM, find_lines
+
+# The rounding of an FFT autocorrelation, with room; a line 60 dB below the rest is still 1e-6.
+ROUNDING = 1e-10
+LAG_MIN = 3  # samples: the shortest period with a line below the Nyquist frequency
+
+
+def difference(x: Floats) -> Floats:
+    """var(x(n) − x(n − l)) / (var x(n) + var x(n − l)) over the samples that overlap, shape (samples,), by lag l.
+
+    0 where the recording repeats exactly, noise/(noise + signal) where it repeats with noise, 1 where it is
+    uncorrelated. Variances about their means, so that an offset and a constant slope have no effect. From the
+    autocorrelation by FFT (Wiener–Khinchin) and running sums: O(n log n), and without the bias of an autocorrelation
+    that divides by the full length. Cf. de Cheveigné, Kawahara 2002 (YIN), eq. (7).
+    """
+    size = fast_length(2 * x.size)
+    spectrum = np.fft.rfft(x, size)
+    product = np.fft.irfft(spectrum.real**2 + spectrum.imag**2, size)[: x.size]
+    del spectrum
+    head, tail = _running(x)
+    head2, tail2 = _running(x * x)
+    overlap = np.arange(x.size, 0, -1)
+    both = head2 + tail2 - (head**2 + tail**2) / overlap
+    unlike = both - 2 * (product - head * tail / overlap)
+    # Where a part is constant its variance is rounding, without information.
+    clear = both > ROUNDING * max(float(both[0]), 0.0)
+    return np.where(clear, unlike / np.where(clear, both, 1.0), 1.0)
+
+
+def _running(x: Floats) -> tuple[Floats, Floats]:
+    """Sums of the first n − l and of the last n − l samples, by l."""
+    sums = np.concatenate(([0.0], np.cumsum(x)))
+    return sums[:0:-1], sums[-1] - sums[:-1]
+
+
+def best_lag(d: Floats, lag_max: int) -> tuple[int, int]:
+    """The shortest lag that repeats as well as any up to `lag_max`, and the width of its valley in samples.
+
+    Lags before the first dissimilarity (halfway from best to worst) are ignored: every slow signal is similar to itself
+    a few samples later. Two lags repeat equally well where their differences are
+    within what noise does to such a sum: a relative standard deviation of √(2/n) each (χ² with n samples), taken three
+    times. Where the signal is smooth, a whole stretch of lags does; its deepest point is the candidate.
+    """
+    lags = d[: lag_max + 1]
+    halfway = (float(lags[1:].max()) + float(lags[1:].min())) / 2
+    first = max(LAG_MIN, int(np.argmax(lags >= halfway)))
+    lags = lags[first:]
+    best = float(lags.min())
+    limit = max(best, 0.0) * (1 + 3 * 2 * np.sqrt(2 / (d.size - lag_max))) + ROUNDING
+    good = lags <= max(limit, best)
+    start = int(np.argmax(good))
+    ends = np.flatnonzero(~good[start:])
+    width = int(ends[0]) if ends.size else lags.size - start
+    return first + start + int(np.argmin(lags[start : start + width])), width
+
+
+_SURE_SIGMAS = 5.0
+_OFF_MIN = 0.1  # samples: two clocks, one for the excitation and one for the recorder, differ by less
+_TIMES_MAX = 8  # of a period that is not whole; more are rarely recorded twice
+_PRECISE = 0.1  # samples: a multiple is whole if it is known as precisely as that
+
+
+def longer_period(x: Floats, period: int, rate_hz: float, d: Floats) -> int:
+    """The period of which `period` is a part at the strong lines only.
+
+    A line of a tenth of the power may have no common factor with the others; then the recording repeats much better
+    after a multiple, at which that line is found. A strong line may also repeat after a number of samples that is not
+    whole, such as 166.67; then its phase drifts from one period to the next, and three periods are one window.
+
+    Parameters
+    ----------
+    x
+        Periodic part of the recording, shape (samples,).
+    period
+        The lag at which it repeats, samples.
+    rate_hz
+        Samples per second.
+    d
+        Its difference at each lag, `repetition.difference`.
+    """
+    multiple = _multiple(x, period, rate_hz, d)
+    if multiple != period:
+        return multiple
+    whole = _whole_multiple(x, period)
+    if 2 * whole > x.size:
+        return period
+    chance = 1 + _SURE_SIGMAS * 2 * np.sqrt(2 / (x.size - whole))
+    return whole if d[whole] <= max(d[period], 0.0) * chance + ROUNDING else period
+
+
+def _multiple(x: Floats, period: int, rate_hz: float, d: Floats) -> int:
+    lags = np.arange(period, x.size // 2 + 1, period)
+    if lags.size < 2:
+        return period
+    lag = int(lags[np.argmax(d[lags] <= 2 * max(float(d[lags].min()), 0.0) + ROUNDING)])
+    if 2 * max(float(d[lag]), 0.0) + ROUNDING >= d[period]:
+        return period
+    classes = with_lines_beside(find_lines(spectra(cut(x, lag))), rate_hz / lag)
+    lines = np.flatnonzero(classes.excited)
+    common = gcd(lag, *map(int, lines))
+    return lag // common if lines.size and lag // common > period else period
+
+
+def _whole_multiple(x: Floats, period: int) -> int:
+    """The nearest whole number of samples with a whole number of true periods; `period` if it is not known better."""
+    off, deviation = period_error(x, period)
+    if abs(off) < max(_OFF_MIN, _SURE_SIGMAS * deviation):
+        return period
+    for times in range(1, _TIMES_MAX + 1):
+        length = times * (period + off)
+        if _SURE_SIGMAS * times * deviation > 0.5 - _PRECISE:
+            break
+        if abs(length - round(length)) <= _PRECISE + 2 * times * deviation and round(length) >= LAG_MIN:
+            return round(length)
+    return period
+
+
+def period_error(x: Floats, period: int) -> tuple[float, float]:
+    """True period minus `period` in samples, and its standard deviation; (0, inf) if it cannot be determined.
+
+    At line k the phase drifts by −2πk·error/period from one period to the next. Least squares over the lines, weighted
+    by their powers, with the scatter of the residuals.
+
+    Examples
+    --------
+    >>> x = np.cos(2 * np.pi * 3 * np.arange(1500) / 500)
+    >>> round(period_error(x, 167)[0], 2)
+    -0.33
+    """
+    periods = spectra(cut(x, period))
+    lines = np.flatnonzero(find_lines(periods).excited)
+    count = len(periods)
+    if count < 3 or not lines.size:
+        return 0.0, np.inf
+    phase = np.unwrap(np.angle(periods[:, lines]), axis=0)
+    phase -= phase.mean(axis=0)
+    weight = np.abs(periods[:, lines].mean(axis=0)) ** 2
+    number = (np.arange(count) - (count - 1) / 2)[:, np.newaxis]
+    slope = -2 * np.pi * lines / period * number  # of the phase, per sample of error
+    squares = float(np.sum(weight * slope**2))
+    error = float(np.sum(weight * slope * phase)) / squares
+    left = float(np.sum(weight * (phase - error * slope) ** 2)) / (lines.size * (count - 1) - 1)
+    return error, float(np.sqrt(left / squares))
+
 
 # A resonance or a slow trajectory is similar from one period to the next, but not from one end of the recording to the
 # other. So neighbouring periods are averaged to at most this many stretches, which are then compared.
@@ -226,15 +368,15 @@ def _too_short(flat: Floats, d: Floats, period: int) -> SignalError | None:
     if longest <= half + 1:
         return None
     lag = half + 1 + int(np.argmin(d[half + 1 : longest]))
-    rest = flat.size - lag
+    overlap = flat.size - lag
     # Further below the best shorter lag than noise in the shorter overlap explains: F with (rest, rest) degrees.
-    if d[lag] * (1 + _SIGMAS * 2 / np.sqrt(rest)) > (d[period] if period else 1.0) or d[lag] > 0.5:
+    if d[lag] * (1 + _SIGMAS * 2 / np.sqrt(overlap)) > (d[period] if period else 1.0) or d[lag] > 0.5:
         return None
     # A multiple of the period, with an error of half a sample each, is not new.
     if period and abs(lag - period * round(lag / period)) <= min(1 + lag // (2 * period), period // 4):
         return None
-    pair = np.concatenate((flat[:rest], flat[lag:]))
-    if log_chance(pair, rest) + np.log(flat.size) > np.log(FALSE_ALARM):
+    pair = np.concatenate((flat[:overlap], flat[lag:]))
+    if log_chance(pair, overlap) + np.log(flat.size) > np.log(FALSE_ALARM):
         return None
     return SignalError(
         "too-short",

@@ -75,8 +75,8 @@ def checked(samples: ArrayLike | Block, name: str) -> Floats:
         )
     # A time column is a ramp except for rounding, and rounding repeats.
     n = np.flatnonzero(np.isfinite(x))
-    rest = known - (known[0] + (known[-1] - known[0]) * (n - n[0]) / max(n[-1] - n[0], 1))
-    if np.ptp(rest) <= _STRAIGHT * np.max(np.abs(known)):
+    deviation = known - (known[0] + (known[-1] - known[0]) * (n - n[0]) / max(n[-1] - n[0], 1))
+    if np.ptp(deviation) <= _STRAIGHT * np.max(np.abs(known)):
         raise SignalError(
             "no-excitation",
             f"the {name} is a straight line",

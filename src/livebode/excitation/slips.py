@@ -68,73 +68,73 @@ class _Search:
         self._noise = float(np.quantile(change, 0.25)) / 2  # of a period: jumps are in fewer than three of four pairs
 
     def slips(self) -> list[Slip]:
-        found: list[Slip] = []
-        at, shift, strange, recent = 0, 0, 0, [self._blocks[0]]
-        while (at := at + 1) < len(self._blocks):
+        slips: list[Slip] = []
+        index, shift, strange, recent = 0, 0, 0, [self._blocks[0]]
+        while (index := index + 1) < len(self._blocks):
             if not strange and len(recent) >= _REMEMBERED:
-                calm = self._calm(at, np.array(recent[-_REMEMBERED:]), shift)
-                recent, at = [*recent[-_REMEMBERED:], *calm], at + len(calm)
-                if at == len(self._blocks):
+                calm = self._calm(index, np.array(recent[-_REMEMBERED:]), shift)
+                recent, index = [*recent[-_REMEMBERED:], *calm], index + len(calm)
+                if index == len(self._blocks):
                     break
             expected = np.mean(recent[-_REMEMBERED:], axis=0)
-            leap = self._leap(at, expected, shift)
+            leap = self._leap(index, expected, shift)
             if leap:
-                found.append(Slip(self._place(at, expected, shift, shift + leap), leap))
+                slips.append(Slip(self._place(index, expected, shift, shift + leap), leap))
                 shift += leap
-            here = np.roll(self._blocks[at], shift)
+            here = np.roll(self._blocks[index], shift)
             # A period with a jump is a poor reference for the next ones; several in sequence show a changed signal.
-            usual = _STRANGE * self._noise + _ROUNDING * self._energy[at]
+            usual = _STRANGE * self._noise + _ROUNDING * self._energy[index]
             strange = strange + 1 if np.sum((here - expected) ** 2) > usual else 0
             if strange in (0, _STRANGE_MAX):
                 recent.append(here)
                 strange = 0
-        return found
+        return slips
 
-    def _calm(self, at: int, recent: Floats, shift: int) -> Floats:
+    def _calm(self, index: int, recent: Floats, shift: int) -> Floats:
         """The next periods, shifted, that have no jump and are not strange: the loop in `slips` for many at a time."""
-        here = np.roll(self._blocks[at : at + _TOGETHER], shift, axis=1)
+        here = np.roll(self._blocks[index : index + _TOGETHER], shift, axis=1)
         known, expected = np.concatenate([recent, here[:-1]]), np.zeros_like(here)
         for behind in range(_REMEMBERED):  # in the order of a mean over the rows: the same bits
             expected += known[behind : behind + len(here)]
         expected /= _REMEMBERED
-        spectra = self._spectra[at : at + _TOGETHER]
+        spectra = self._spectra[index : index + _TOGETHER]
         agreement = np.fft.irfft(np.fft.rfft(expected, axis=1) * spectra.conj(), self._period, axis=1)
-        usual = _STRANGE * self._noise + _ROUNDING * self._energy[at : at + _TOGETHER]
+        usual = _STRANGE * self._noise + _ROUNDING * self._energy[index : index + _TOGETHER]
         jumps = np.argmax(agreement, axis=1) != shift % self._period
-        found = jumps | (np.sum((here - expected) ** 2, axis=1) > usual)
-        return here[: int(np.argmax(found))] if found.any() else here
+        unusual = jumps | (np.sum((here - expected) ** 2, axis=1) > usual)
+        return here[: int(np.argmax(unusual))] if unusual.any() else here
 
-    def _leap(self, at: int, expected: Floats, shift: int) -> int:
+    def _leap(self, index: int, expected: Floats, shift: int) -> int:
         """Phase jump in samples in this period or the previous one; 0 without a jump."""
-        if at + _CONFIRMED > len(self._blocks):
+        if index + _CONFIRMED > len(self._blocks):
             return 0
         template = np.fft.rfft(expected)
         own = np.fft.irfft(np.abs(template) ** 2, self._period)
         leap = 0
-        for m in range(at, at + _CONFIRMED):
+        for m in range(index, index + _CONFIRMED):
             agreement = np.fft.irfft(template * self._spectra[m].conj(), self._period)
             best = int(np.argmax(agreement))
             here = _folded(best - shift, self._period)
             energy = 2 * (own[0] - own[here % self._period])
             gain = 2 * (agreement[best] - agreement[shift % self._period])
-            rest = self._energy[m] + own[0] - 2 * agreement[best]
-            fits = rest <= self._noise * 2 + _AGREES * energy
+            residual = self._energy[m] + own[0] - 2 * agreement[best]
+            fits = residual <= self._noise * 2 + _AGREES * energy
             least = max(_CLEAR * self._noise / self._period, _UNCHANGED * self._energy[m])
             clear = gain > energy / 2 and energy > least
             if not here or not fits or not clear or (leap and here != leap):
                 return 0
             leap = here
-        return leap if self._fitted(at, expected, shift, float(energy)) else 0
+        return leap if self._fitted(index, expected, shift, float(energy)) else 0
 
-    def _fitted(self, at: int, expected: Floats, shift: int, energy: float) -> bool:
+    def _fitted(self, index: int, expected: Floats, shift: int, energy: float) -> bool:
         """Whether one of the two previous periods still fits the old phase: the jump may be in the nearer one."""
-        before = [np.roll(self._blocks[m], shift) for m in range(max(at - 2, 0), at)]
+        before = [np.roll(self._blocks[m], shift) for m in range(max(index - 2, 0), index)]
         rests = [float(np.sum((block - expected) ** 2)) for block in before]
         return min(rests) <= self._noise * 2 + _AGREES * energy
 
-    def _place(self, at: int, expected: Floats, shift: int, leapt: int) -> int:
+    def _place(self, index: int, expected: Floats, shift: int, leapt: int) -> int:
         """The first sample after the jump: the least residual of the old phase before and the new phase after."""
-        first, last = max(at - 1, 0) * self._period, (at + 1) * self._period
+        first, last = max(index - 1, 0) * self._period, (index + 1) * self._period
         n, part = np.arange(first, last), self._x[first:last]
         old = (part - expected[(n + shift) % self._period]) ** 2
         new = (part - expected[(n + leapt) % self._period]) ** 2
@@ -143,12 +143,12 @@ class _Search:
 
 def _row_energies(blocks: Floats, minus: Floats | None = None) -> Floats:
     """The sum of squares of each row, or of the difference of two; some rows at a time, to need little memory."""
-    found = np.empty(len(blocks))
-    for at in range(0, len(blocks), _TOGETHER):
-        rows = slice(at, at + _TOGETHER)
+    energies = np.empty(len(blocks))
+    for first in range(0, len(blocks), _TOGETHER):
+        rows = slice(first, first + _TOGETHER)
         part = blocks[rows] if minus is None else blocks[rows] - minus[rows]
-        found[rows] = np.sum(part**2, axis=1)
-    return found
+        energies[rows] = np.sum(part**2, axis=1)
+    return energies
 
 
 def _folded(shift: int, period: int) -> int:

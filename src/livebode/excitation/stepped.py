@@ -1,4 +1,4 @@
-"""One line after the other."""
+"""Stepped sines: one line after the other."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def stepped_sine(lines: Lines, amplitude: ArrayLike = 1.0, *, periods: int = 4) 
 
 
 def stepped_lines(lines: Lines, *, periods: int = 4) -> Lines:
-    """The same frequencies on the grid of the whole sequence."""
+    """Lines of these frequencies on the grid of the whole sequence."""
     if periods < 1:
         raise UsageError(
             "out-of-range",

@@ -6,7 +6,8 @@ import numpy as np
 
 from livebode.arrays import Flags, Floats
 from livebode.core import normal_quantile
-from livebode.excitation.blocks import medians, spectra
+from livebode.excitation._medians import medians
+from livebode.excitation.blocks import spectra
 
 FALSE_ALARM = 1e-3  # probability that any period of a recording is marked by chance
 # With fewer periods there is no majority of steady ones.

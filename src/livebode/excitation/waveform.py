@@ -89,7 +89,7 @@ class Waveform:
         return max(1, round(float(self.about.get("ramp_s", 0.0)) * self.lines.rate_hz / self.lines.window))
 
     def scaled(self, factor: float) -> Waveform:
-        """The same excitation multiplied by `factor`."""
+        """Excitation multiplied by `factor`."""
         return replace(self, samples=self.samples * factor)
 
     def quantised(self, step: float) -> Waveform:

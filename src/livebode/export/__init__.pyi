@@ -13,5 +13,5 @@ from livebode.export.matrix_labelled import write_matrix_netcdf as write_matrix_
 from livebode.export.matrix_matlab import write_matrix_mat as write_matrix_mat
 from livebode.export.matrix_universal import write_matrix_uff as write_matrix_uff
 from livebode.export.parameters import ParameterTable as ParameterTable
-from livebode.export.selection import at as at
+from livebode.export.selection import nearest_response as nearest_response
 from livebode.export.universal import write_uff as write_uff

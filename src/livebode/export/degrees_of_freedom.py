@@ -25,8 +25,8 @@ class DegreeOfFreedom(NamedTuple):
     @classmethod
     def parse(cls, text: str) -> DegreeOfFreedom:
         """A node with sign and direction, or a node alone for a scalar; UsageError for another text."""
-        found = _WRITTEN.fullmatch(text.strip().upper())
-        if found is None:
+        match = _WRITTEN.fullmatch(text.strip().upper())
+        if match is None:
             raise UsageError(
                 "out-of-range",
                 f"{text!r} is not a degree of freedom",
@@ -34,10 +34,10 @@ class DegreeOfFreedom(NamedTuple):
                 argument="dofs",
                 value=text,
             )
-        if found["direction"] is None:
-            return cls(int(found["node"]), 0)
-        number = 1 + _DIRECTIONS.index(found["direction"])
-        return cls(int(found["node"]), -number if found["sign"] == "-" else number)
+        if match["direction"] is None:
+            return cls(int(match["node"]), 0)
+        number = 1 + _DIRECTIONS.index(match["direction"])
+        return cls(int(match["node"]), -number if match["sign"] == "-" else number)
 
     def __str__(self) -> str:
         if not self.direction:

@@ -99,11 +99,12 @@ class LpvModel:
 
     def plain(self) -> dict[str, Any]:
         """For JSON: the grid, and at each point the parameters with their covariance."""
-        found = self.parameters
+        parameters = self.parameters
         return {
-            "model": found.model, "output": self.output, "side": self.side, "radius_m": self.radius_m,
-            "interpolation": "linear", "names": list(found.names), "units": list(found.units),
-            "position": self.position.tolist(), "value": found.value.tolist(), "covariance": found.covariance.tolist(),
+            "model": parameters.model, "output": self.output, "side": self.side, "radius_m": self.radius_m,
+            "interpolation": "linear", "names": list(parameters.names), "units": list(parameters.units),
+            "position": self.position.tolist(), "value": parameters.value.tolist(),
+            "covariance": parameters.covariance.tolist(),
         }  # fmt: skip
 
 

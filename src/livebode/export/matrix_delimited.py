@@ -46,37 +46,37 @@ def write_matrix_csv(
     return WriteResult(rows)
 
 
-def _columns(one: MatrixResponses) -> list[Column]:
+def _columns(matrix: MatrixResponses) -> list[Column]:
     """Of one response, over (outputs, inputs, lines)."""
-    shape = len(one.outputs), len(one.inputs), len(one.lines)
+    shape = len(matrix.outputs), len(matrix.inputs), len(matrix.lines)
 
     def long(values: Any) -> Any:
         return np.broadcast_to(values, shape).ravel()
 
-    value = one.value[0].transpose(1, 2, 0).ravel()
-    reason = one.reason[0].T
-    entries = [(output, input) for output in one.outputs for input in one.inputs]
-    units = [one.entry(output, input).unit for output, input in entries]
+    value = matrix.value[0].transpose(1, 2, 0).ravel()
+    reason = matrix.reason[0].T
+    entries = [(output, input) for output in matrix.outputs for input in matrix.inputs]
+    units = [matrix.entry(output, input).unit for output, input in entries]
     with np.errstate(divide="ignore"):
         magnitude_db = 20 * np.log10(np.abs(value))
     return [
-        long(one.time_s),
+        long(matrix.time_s),
         _repeated([output for output, _ in entries], shape[2]),
         _repeated([input for _, input in entries], shape[2]),
-        long(one.frequency_hz),
+        long(matrix.frequency_hz),
         value.real,
         value.imag,
         magnitude_db,
         np.degrees(np.angle(value)),
-        one.sigma[0].transpose(1, 2, 0).ravel(),
+        matrix.sigma[0].transpose(1, 2, 0).ravel(),
         _repeated(units, shape[2]),
-        long(one.dof),
-        long(one.coherence[0].T[:, np.newaxis]),
-        long(one.condition[0]),
+        long(matrix.dof),
+        long(matrix.coherence[0].T[:, np.newaxis]),
+        long(matrix.condition[0]),
         long(reason == 0),
         [REASONS[number] for number in long(reason)],
-        long(one.first),
-        long(one.sample),
+        long(matrix.first),
+        long(matrix.sample),
     ]
 
 

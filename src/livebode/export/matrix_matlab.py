@@ -86,5 +86,6 @@ def _of_parts(sigma: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _cells(words: tuple[str, ...]) -> NDArray[np.object_]:
     cells = np.empty((len(words), 1), dtype=object)
-    cells[:, 0] = words
+    # SciPy writes an object with attributes, such as a Message, as a struct.
+    cells[:, 0] = [str(word) for word in words]
     return cells

@@ -9,7 +9,7 @@ import numpy as np
 from livebode.core import Response, Responses, SignalError, UsageError
 
 
-def at(parts: Iterable[Responses], time_s: float) -> Response:
+def nearest_response(parts: Iterable[Responses], time_s: float) -> Response:
     """The response with a valid line that is nearest to a time.
 
     Its effective time is its own `time_s`, the centre of its window; nothing is interpolated.
@@ -38,9 +38,9 @@ def at(parts: Iterable[Responses], time_s: float) -> Response:
         usable = np.flatnonzero(part.valid.any(axis=1))
         if not usable.size:
             continue
-        found = part[int(usable[np.argmin(np.abs(part.time_s[usable] - time_s))])]
-        if nearest is None or abs(found.time_s - time_s) < abs(nearest.time_s - time_s):
-            nearest = found
+        candidate = part[int(usable[np.argmin(np.abs(part.time_s[usable] - time_s))])]
+        if nearest is None or abs(candidate.time_s - time_s) < abs(nearest.time_s - time_s):
+            nearest = candidate
     if nearest is None:
         raise SignalError("no-valid-response", "no response has a valid line", "see the run's events for the reason")
     reach_s = nearest.lines.window / nearest.lines.rate_hz / 2

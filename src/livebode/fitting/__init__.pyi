@@ -18,8 +18,9 @@ from livebode.fitting.drift import DriftTest as DriftTest
 from livebode.fitting.fitter import Fitter as Fitter
 from livebode.fitting.least_squares import minimise as minimise
 from livebode.fitting.mean import RunningMean as RunningMean
+from livebode.fitting.mean import mean_matrix as mean_matrix
 from livebode.fitting.mean import mean_response as mean_response
-from livebode.fitting.mean_of_recordings import Between as Between
+from livebode.fitting.mean_of_recordings import RecordingScatter as RecordingScatter
 from livebode.fitting.mean_of_recordings import RecordingsMean as RecordingsMean
 from livebode.fitting.models import model_named as model_named
 from livebode.fitting.once import Fit as Fit
@@ -42,7 +43,7 @@ from livebode.fitting.rational import Rational as Rational
 from livebode.fitting.rational import fit_rational as fit_rational
 from livebode.fitting.rational import rational_of as rational_of
 from livebode.fitting.separable import Outputs as Outputs
-from livebode.fitting.separable import Separated as Separated
+from livebode.fitting.separable import SeparatedFit as SeparatedFit
 from livebode.fitting.separable import pole_price as pole_price
 from livebode.fitting.separable import solve as solve
 from livebode.fitting.together import fit_each as fit_each

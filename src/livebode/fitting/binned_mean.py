@@ -51,11 +51,11 @@ class SharedWindows:
 
     def share(self, apart: NDArray[np.int64]) -> Floats:
         """Correlation of two responses whose newest samples are so far apart, shape of `apart`."""
-        found = np.zeros(apart.shape)
+        share = np.zeros(apart.shape)
         for later in range(self.experiments):
             common = 1 - np.abs(apart - later * self.span) / self.window
-            found += (self.experiments - later) / self.experiments * np.maximum(common, 0.0)
-        return found
+            share += (self.experiments - later) / self.experiments * np.maximum(common, 0.0)
+        return share
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,40 +163,40 @@ def combined(parts: BinnedMeans, bin_s: float) -> BinnedMeans:
     if len(starts) == len(parts):
         return parts
     rows = np.diff(np.append(starts, len(parts)))[:, np.newaxis]
-    one, count = parts.means, parts.count
+    means, count = parts.means, parts.count
     used = count > 0
-    weight = np.where(used, np.where(used, one.weight, 0.0) * count, 0.0)
-    known = np.where(used, one.value, 0.0)
+    weight = np.where(used, np.where(used, means.weight, 0.0) * count, 0.0)
+    known = np.where(used, means.value, 0.0)
     sums = np.add.reduceat(weight, starts, axis=0)
     windows = np.add.reduceat(np.nan_to_num(parts.windows), starts, axis=0)
-    repeats = np.where(np.isfinite(one.distortion), one.distortion, 0.0)
-    noise = np.sqrt(np.maximum(np.where(used, one.sigma, 0.0) ** 2 - repeats**2, 0.0))
+    repeats = np.where(np.isfinite(means.distortion), means.distortion, 0.0)
+    noise = np.sqrt(np.maximum(np.where(used, means.sigma, 0.0) ** 2 - repeats**2, 0.0))
     with np.errstate(invalid="ignore", divide="ignore"):
         value = np.add.reduceat(known * weight, starts, axis=0) / sums
         variance = (np.abs(weight) * noise) ** 2
         total = np.add.reduceat(variance, starts, axis=0)
-        free = total**2 / np.add.reduceat(variance**2 / one.dof[:, np.newaxis], starts, axis=0)
+        free = total**2 / np.add.reduceat(variance**2 / means.dof[:, np.newaxis], starts, axis=0)
         independent = np.sqrt(total * (1 + (rows - 1) / (3 * windows))) / np.abs(sums)
-        shared = np.searchsorted(one.first, one.sample, side="right") - np.arange(len(one)) - 1
+        shared = np.searchsorted(means.first, means.sample, side="right") - np.arange(len(means)) - 1
         most = np.maximum.reduceat(np.maximum(shared, 0), starts)[:, np.newaxis]
         added = np.add.reduceat(np.abs(weight) * noise, starts, axis=0)
         dependent = np.minimum(added, np.sqrt(total * (1 + 2 * most))) / np.abs(sums)
     short = np.maximum.reduceat(used & (parts.windows < 2), starts, axis=0)
-    least = np.minimum.reduceat(np.where(np.isfinite(one.dof), one.dof, np.inf), starts)[:, np.newaxis]
-    distortion = _newest_known(one.distortion, starts)
+    least = np.minimum.reduceat(np.where(np.isfinite(means.dof), means.dof, np.inf), starts)[:, np.newaxis]
+    distortion = _newest_known(means.distortion, starts)
     counts = np.add.reduceat(count, starts, axis=0)
     several = (counts > 0) & ~short
     sigma, dof = _with_distortion(
         np.where(short, dependent, independent), np.where(short, least, np.where(several, free, np.inf)), distortion,
         several,
     )  # fmt: skip
-    means = _reduced(one, starts, value, used, count)
-    means = replace(
-        means, sigma=sigma, dof=dof, distortion=distortion, ready=np.maximum.reduceat(one.ready, starts),
+    reduced = _reduced(means, starts, value, used, count)
+    reduced = replace(
+        reduced, sigma=sigma, dof=dof, distortion=distortion, ready=np.maximum.reduceat(means.ready, starts),
         weight=np.where(counts > 0, sums / np.maximum(counts, 1), complex(np.nan, np.nan)),
     )  # fmt: skip
     total_responses = np.add.reduceat(parts.responses, starts)
-    return BinnedMeans(means, counts, np.where(counts > 0, windows, np.nan), total_responses)
+    return BinnedMeans(reduced, counts, np.where(counts > 0, windows, np.nan), total_responses)
 
 
 def _starts(time_s: Floats, bin_s: float) -> Starts:
@@ -248,8 +248,8 @@ def _newest_known(values: Floats, starts: Starts) -> Floats:
     """The last finite value of each span at each line; NaN without one."""
     row = np.where(np.isfinite(values), np.arange(len(values))[:, np.newaxis], -1)
     newest = np.maximum.reduceat(row, starts, axis=0)
-    found = np.take_along_axis(values, np.maximum(newest, 0), axis=0)
-    return np.where(newest >= 0, found, np.nan)
+    newest_values = np.take_along_axis(values, np.maximum(newest, 0), axis=0)
+    return np.where(newest >= 0, newest_values, np.nan)
 
 
 def _reduced(
@@ -259,7 +259,7 @@ def _reduced(
     used: NDArray[np.bool_],
     count: NDArray[np.int64] | None = None,
 ) -> Responses:
-    """These values with the extent and the means of the other columns."""
+    """Responses with these values, and with the extent and the means of the other columns."""
     each = np.ones_like(used, dtype=np.int64) if count is None else count
 
     def mean(values: Floats) -> Floats:

@@ -11,10 +11,10 @@ import numpy as np
 from livebode.arrays import Complex, Floats
 from livebode.core import UsageError
 from livebode.fitting.modal import QUALITY, chain_of, scan
-from livebode.fitting.physical import EvaluationGrid, Parameter, PhysicalModel, delay, free_friction
-from livebode.fitting.polynomials import plus, times
+from livebode.fitting.physical import EvaluationGrid, Parameter, PhysicalModel, delay, free_friction, plus, times
 from livebode.language import Message
 
+# Bounds far beyond every machine: they only keep the search finite.
 _INERTIA = (1e-9, 1e7)
 _MASS = (1e-6, 1e9)
 _STIFFNESS = (1e-6, 1e15)
@@ -90,10 +90,10 @@ class Chain(PhysicalModel):
             dragged[..., self.names.index(name)] = values[..., 0] * (2 * np.pi * grid.frequency_hz.min() / 10) / arm
         return dragged
 
-    def _whole(self, found: Floats, grid: EvaluationGrid) -> Floats:
+    def _whole(self, values: Floats, grid: EvaluationGrid) -> Floats:
         """Values (..., some) followed by frictions and a delay of zero."""
-        rest = np.zeros((*found.shape[:-1], len(self.names) - found.shape[-1]))
-        return self.shown(np.concatenate([found, rest], axis=-1), grid)
+        others = np.zeros((*values.shape[:-1], len(self.names) - values.shape[-1]))
+        return self.shown(np.concatenate([values, others], axis=-1), grid)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -161,16 +161,16 @@ class TwoMass(Chain):
 
     def transfer(self, *parameters: Any) -> tuple[list[Any], list[Any]]:
         js, load, k, d, b, bl = self._at_the_shaft(*parameters)
-        rest = [0.0] * (self.integrators - 1)
+        integrators = [0.0] * (self.integrators - 1)
         if not (np.any(b) or np.any(bl)):
-            denominator = [js * load, (js + load) * d, (js + load) * k, 0.0, *rest]
+            denominator = [js * load, (js + load) * d, (js + load) * k, 0.0, *integrators]
         else:
             denominator = [
                 js * load,
                 js * (d + bl) + load * (d + b),
                 (js + load) * k + b * bl + d * (b + bl),
                 k * (b + bl),
-                *rest,
+                *integrators,
             ]
         if self.side == "load":
             return [self.lever * d, self.lever * k], denominator
@@ -207,10 +207,10 @@ class TwoMass(Chain):
         if load_side:
             weights = weights[..., :1] * np.array([1.0, 1.0 if ratio is None else ratio])
         inertia, spring, damper = chain_of(weights, omega)
-        found = [inertia[..., 0], inertia[..., 1] / self.arm, spring[..., 0] / self.arm, damper[..., 0] / self.arm]
+        parts = [inertia[..., 0], inertia[..., 1] / self.arm, spring[..., 0] / self.arm, damper[..., 0] / self.arm]
         if ratio is not None:
-            del found[1]
-        return self._whole(np.stack(found, axis=-1), grid)
+            del parts[1]
+        return self._whole(np.stack(parts, axis=-1), grid)
 
 
 _HZ = (1e-4, 1e6)
@@ -257,8 +257,8 @@ class TwoMassGain(PhysicalModel):
     ) -> tuple[list[Any], list[Any]]:
         low, high = 2 * pi * low, 2 * pi * high
         numerator = [gain / low**2, 2 * gain * damping_low / low, gain]
-        rest = [0.0] * (1 if self.output == "velocity" else 2)
-        return numerator, [1 / high**2, 2 * damping_high / high, 1.0, *rest]
+        integrators = [0.0] * (1 if self.output == "velocity" else 2)
+        return numerator, [1 / high**2, 2 * damping_high / high, 1.0, *integrators]
 
     @property
     def derived_names(self) -> tuple[str, ...]:
@@ -314,8 +314,8 @@ class ThreeMass(Chain):
     def starts(self, value: Complex, weight: Floats, grid: EvaluationGrid) -> Floats:
         weights, omega = scan(value, weight, grid, modes=2, integrators=self.integrators)
         inertia, spring, damper = chain_of(weights, omega)
-        found = [inertia[..., :1], *(x / self.arm for x in (inertia[..., 1:], spring, damper))]
-        return self._whole(np.concatenate(found, axis=-1), grid)
+        parts = [inertia[..., :1], *(x / self.arm for x in (inertia[..., 1:], spring, damper))]
+        return self._whole(np.concatenate(parts, axis=-1), grid)
 
 
 def _check_choice(argument: str, value: str, allowed: list[str]) -> None:

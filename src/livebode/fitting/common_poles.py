@@ -17,9 +17,9 @@ from livebode.fitting.partial_fractions import PartialFractions, PoleQuantities
 from livebode.fitting.patterns import RUNS, neighbours
 from livebode.fitting.physical import EvaluationGrid, Hold
 from livebode.fitting.pole_search import ORDER_MAX, Kind, possible, search
-from livebode.fitting.problem import Measured
+from livebode.fitting.problem import MeasuredRows
 from livebode.fitting.rows import EPSILON_MAX, NO_FIT, NO_RESPONSE, NOT_CONVERGED, NOT_SEEN, SENTENCES
-from livebode.fitting.separable import Outputs, Separated, whole_covariance
+from livebode.fitting.separable import Outputs, SeparatedFit, whole_covariance
 from livebode.fitting.weights import chi_squared, squares
 from livebode.language import Message
 
@@ -37,7 +37,7 @@ class CommonPoles:
         "modal" or "rational".
     outputs, units
         Name and unit of the response of each output.
-    found
+    best
         The fitted partial fractions; None if there are too few lines.
     grid
         Lines, rate and hold.
@@ -54,13 +54,13 @@ class CommonPoles:
     specified
         Whether the order was specified.
     raw_covariance
-        Of the coefficients of `found`: those of the poles and delays, then the weights of each output.
+        Of the coefficients of `best`: those of the poles and delays, then the weights of each output.
     """
 
     model: Kind
     outputs: tuple[str, ...]
     units: tuple[str, ...]
-    found: Separated | None
+    best: SeparatedFit | None
     grid: EvaluationGrid
     unit: float
     tried: tuple[tuple[int, float], ...]
@@ -88,22 +88,20 @@ class CommonPoles:
 
     @property
     def raw(self) -> Floats:
-        """Coefficients of `found`, in the order of `raw_covariance`."""
-        return np.empty(0) if self.found is None else np.concatenate([self.found.theta, self.found.linear.ravel()])
+        """Coefficients of `best`, in the order of `raw_covariance`."""
+        return np.empty(0) if self.best is None else np.concatenate([self.best.theta, self.best.linear.ravel()])
 
     def moved(self, raw: Floats, frequency_hz: Floats) -> Complex:
         """Response of the first output for other coefficients, (lines,)."""
-        assert self.found is not None
-        of = self.found.structure
-        found = replace(
-            self.found, theta=raw[: of.nonlinear], linear=raw[of.nonlinear :].reshape(of.outputs, of.linear)
-        )
-        return np.asarray(response_of(found, self.grid._replace(frequency_hz=frequency_hz), self.unit)[0])
+        assert self.best is not None
+        of = self.best.structure
+        moved = replace(self.best, theta=raw[: of.nonlinear], linear=raw[of.nonlinear :].reshape(of.outputs, of.linear))
+        return np.asarray(response_of(moved, self.grid._replace(frequency_hz=frequency_hz), self.unit)[0])
 
     @property
     def order(self) -> int:
         """Number of modes, or of poles without integrators."""
-        return 0 if self.found is None else _order(self.found, self.model)
+        return 0 if self.best is None else _order(self.best, self.model)
 
     @property
     def complete(self) -> bool:
@@ -113,11 +111,11 @@ class CommonPoles:
     @property
     def about_order(self) -> str:
         """How the order was chosen, as text."""
-        what = counted(self.order, "mode" if self.model == "modal" else "pole")
+        chosen = counted(self.order, "mode" if self.model == "modal" else "pole")
         if self.specified:
-            return f"{what}, as specified"
-        rest = "".join(f"; {order} costs {cost - self.tried[0][1]:.0f} more" for order, cost in self.tried[1:4])
-        return f"{what}, by −2·ln(likelihood) + ln(values) for each parameter (BIC){rest}"
+            return f"{chosen}, as specified"
+        others = "".join(f"; {order} costs {cost - self.tried[0][1]:.0f} more" for order, cost in self.tried[1:4])
+        return f"{chosen}, by −2·ln(likelihood) + ln(values) for each parameter (BIC){others}"
 
     @property
     def about_bounds(self) -> str:
@@ -149,7 +147,7 @@ class CommonPoles:
         FitError
             If the fit failed.
         """
-        if self.status != OK or self.found is None:
+        if self.status != OK or self.best is None:
             raise FitError(
                 "not-fitted",
                 f"there is no fit to evaluate: {self.sentence}",
@@ -157,14 +155,14 @@ class CommonPoles:
                 status=self.status,
             )
         f = np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64))
-        return response_of(self.found, self.grid._replace(frequency_hz=f), self.unit)
+        return response_of(self.best, self.grid._replace(frequency_hz=f), self.unit)
 
 
-def response_of(found: Separated, grid: EvaluationGrid, unit: float) -> Complex:
+def response_of(of: SeparatedFit, grid: EvaluationGrid, unit: float) -> Complex:
     """Response of each output, (outputs, lines)."""
-    shapes = PartialFractions(found.structure, grid, unit)
-    delays = found.structure.delays_of(found.theta)
-    return np.array([shapes.columns(found.theta, float(late)) @ c for late, c in zip(delays, found.linear)])
+    shapes = PartialFractions(of.structure, grid, unit)
+    delays = of.structure.delays_of(of.theta)
+    return np.array([shapes.columns(of.theta, float(late)) @ c for late, c in zip(delays, of.linear)])
 
 
 def fit_common_poles(
@@ -219,7 +217,7 @@ def fit_common_poles(
     (1, 59.4, True)
     """
     check_model(model, order)
-    batches = [mean_response(one) if isinstance(one, Responses) else Responses.of(one) for one in measured]
+    batches = [mean_response(batch) if isinstance(batch, Responses) else Responses.of(batch) for batch in measured]
     names = tuple(outputs or (f"y{k + 1}" for k in range(len(batches))))
     outs = outputs_of(batches, names, band_hz, hold)
     best = search(outs, model, order)
@@ -227,30 +225,30 @@ def fit_common_poles(
 
 
 def assembled(
-    outs: Outputs, best: Sequence[Separated], names: tuple[str, ...], batches: Sequence[Responses], model: Kind, *,
+    outs: Outputs, best: Sequence[SeparatedFit], names: tuple[str, ...], batches: Sequence[Responses], model: Kind, *,
     specified: bool, covariance: Floats | None = None,
 ) -> CommonPoles:  # fmt: skip
     """The first of these fits with its quantities; `covariance` by default with independent outputs."""
     blank = _Blank(model, names, batches)
     if not best:
         return blank.without_fit(outs)
-    found = best[0]
-    raw = np.concatenate([found.theta, found.linear.ravel()])
-    quantities = PoleQuantities(found.structure, outs.unit, names, blank.units, raw)
-    covariance = whole_covariance(outs, found) if covariance is None else covariance
-    parameters = blank.parameters(quantities, outs, found, covariance)
-    rest = np.where(outs.measured.use, outs.measured.value - found.response, 0.0) * found.weight
-    correlated = np.array([neighbours(one[use]) for one, use in zip(rest, outs.measured.use)])
+    chosen = best[0]
+    raw = np.concatenate([chosen.theta, chosen.linear.ravel()])
+    quantities = PoleQuantities(chosen.structure, outs.unit, names, blank.units, raw)
+    covariance = whole_covariance(outs, chosen) if covariance is None else covariance
+    parameters = blank.parameters(quantities, outs, chosen, covariance)
+    residual = np.where(outs.measured.use, outs.measured.value - chosen.response, 0.0) * chosen.weight
+    correlated = np.array([neighbours(weighted[use]) for weighted, use in zip(residual, outs.measured.use)])
     limit = RUNS / np.sqrt(2 * np.count_nonzero(outs.measured.use, axis=1))
     return CommonPoles(
-        model, names, blank.units, found, outs.grid, outs.unit, tuple((_order(one, model), one.cost) for one in best),
-        parameters, found.epsilon, _reduced_chi2(outs, found), correlated,
-        tuple(name for name, one in zip(names, correlated > limit) if one), specified, covariance,
+        model, names, blank.units, chosen, outs.grid, outs.unit, tuple((_order(of, model), of.cost) for of in best),
+        parameters, chosen.epsilon, _reduced_chi2(outs, chosen), correlated,
+        tuple(name for name, high in zip(names, correlated > limit) if high), specified, covariance,
     )  # fmt: skip
 
 
-def _order(found: Separated, model: Kind) -> int:
-    return found.structure.pairs if model == "modal" else found.structure.poles
+def _order(of: SeparatedFit, model: Kind) -> int:
+    return of.structure.pairs if model == "modal" else of.structure.poles
 
 
 def check_model(model: str, order: int | None) -> None:
@@ -271,8 +269,8 @@ def outputs_of(
 ) -> Outputs:
     """Lines of all outputs inside of a band."""
     lines = batches[0].lines
-    for name, one in zip(names, batches):
-        if not lines.alike(one.lines):
+    for name, batch in zip(names, batches):
+        if not lines.alike(batch.lines):
             raise GridError(
                 "not-alike",
                 f"{name!r} and {names[0]!r} have different lines or rates, so their poles cannot be fitted together",
@@ -285,17 +283,19 @@ def outputs_of(
         raise FitError(
             "too-few-lines", f"the band {low:g} … {high:g} Hz has no lines", "choose a band with lines", lines=0
         )
-    parts = [measured_of(one, inside) for one in batches]
-    whole = Measured(*(np.concatenate([getattr(part, of) for part, _ in parts]) for of in ("value", "sigma", "use")))
+    parts = [measured_of(batch, inside) for batch in batches]
+    whole = MeasuredRows(
+        *(np.concatenate([getattr(part, of) for part, _ in parts]) for of in ("value", "sigma", "use"))
+    )
     dof = np.concatenate([np.asarray(dof) for _, dof in parts])
     grid = EvaluationGrid(lines.frequency_hz[inside], lines.rate_hz, hold)
     return Outputs(whole, np.where(np.isnan(dof), np.inf, dof), grid)
 
 
-def _reduced_chi2(outs: Outputs, found: Separated) -> Floats:
-    rest, noise, _ = squares(outs.measured, found.response)
+def _reduced_chi2(outs: Outputs, of: SeparatedFit) -> Floats:
+    residual, noise, _ = squares(outs.measured, of.response)
     values = 2.0 * np.count_nonzero(outs.measured.use, axis=1)
-    return np.asarray(chi_squared(rest, noise) / np.maximum(values - found.structure.size / len(values), 1.0))
+    return np.asarray(chi_squared(residual, noise) / np.maximum(values - of.structure.size / len(values), 1.0))
 
 
 class _Blank:
@@ -303,7 +303,7 @@ class _Blank:
 
     def __init__(self, model: Kind, names: tuple[str, ...], batches: Sequence[Responses]) -> None:
         self._model, self._names, self._first = model, names, batches[0]
-        self.units = tuple(one.unit for one in batches)
+        self.units = tuple(batch.unit for batch in batches)
 
     def without_fit(self, outs: Outputs) -> CommonPoles:
         nan = np.full(len(self._names), np.nan)
@@ -325,24 +325,24 @@ class _Blank:
             np.empty((0, 0)),
         )
 
-    def parameters(self, quantities: PoleQuantities, outs: Outputs, found: Separated, covariance: Floats) -> Parameters:
-        raw = np.concatenate([found.theta, found.linear.ravel()])
+    def parameters(self, quantities: PoleQuantities, outs: Outputs, of: SeparatedFit, covariance: Floats) -> Parameters:
+        raw = np.concatenate([of.theta, of.linear.ravel()])
         names = tuple(f"x{i}" for i in range(len(raw)))
         status = OK
-        terms = found.structure.poles + found.structure.integrators
-        if not terms or not np.isfinite(covariance).all() or not possible(outs, found, self._model):
+        terms = of.structure.poles + of.structure.integrators
+        if not terms or not np.isfinite(covariance).all() or not possible(outs, of, self._model):
             status = NOT_SEEN
-        elif (found.epsilon > EPSILON_MAX).any():
+        elif (of.epsilon > EPSILON_MAX).any():
             status = NO_FIT
-        elif not found.settled:
+        elif not of.settled:
             status = NOT_CONVERGED
-        rest, noise, _ = squares(outs.measured, found.response)
-        chi2, dof = chi_squared(rest, noise), outs.count - found.structure.size
-        row = self._row(names, ("",) * len(raw), raw, covariance, status, found.epsilon, chi2, float(dof))
+        residual, noise, _ = squares(outs.measured, of.response)
+        chi2, dof = chi_squared(residual, noise), outs.count - of.structure.size
+        row = self._row(names, ("",) * len(raw), raw, covariance, status, of.epsilon, chi2, float(dof))
         shown = row.derived(quantities.names, quantities.units, quantities.of)
         if status == OK and (shown.sigma[0] > _UNCERTAIN * np.abs(shown.value[0]))[quantities.certain].any():
             return self._row(
-                shown.names, shown.units, shown.value[0], shown.covariance[0], NOT_SEEN, found.epsilon, chi2,
+                shown.names, shown.units, shown.value[0], shown.covariance[0], NOT_SEEN, of.epsilon, chi2,
                 float(dof),
             )  # fmt: skip
         return shown

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from livebode.arrays import Floats
 from livebode.core import OK, Stage, StatefulBase
 from livebode.fitting.physical import DELAY
-from livebode.fitting.problem import Measured, Problem
+from livebode.fitting.problem import MeasuredRows, Problem
 from livebode.fitting.rows import FRICTION, FittedRows, fit_rows
 from livebode.fitting.weights import misfit
 
@@ -53,19 +53,19 @@ class DelayChoice(StatefulBase):
         """The problem that rows are fitted with at present."""
         return self.freed if self.taken else self.held
 
-    def weigh(self, group: int, measured: Measured, noise_dof: Floats, found: FittedRows) -> FittedRows:
+    def weigh(self, group: int, measured: MeasuredRows, noise_dof: Floats, rows: FittedRows) -> FittedRows:
         """Compare both fits where this group (its number) decides; rows as they are fitted, `found` or with a delay."""
         if self._freed is None or not _decides(group, self.taken):
-            return found
-        held, freed = found, found
+            return rows
+        held, freed = rows, rows
         if self.taken:
-            held = fit_rows(self.held, measured, noise_dof, self.held.with_held(found.ended))
+            held = fit_rows(self.held, measured, noise_dof, self.held.with_held(rows.ended))
         else:
-            freed = fitted_freely(self.held, self._freed, measured, noise_dof, found)
+            freed = fitted_freely(self.held, self._freed, measured, noise_dof, rows)
         gain = gains(measured, noise_dof, held, freed)
         gain = np.where((freed.status == OK) & self._possible(freed), gain, np.where(held.status == OK, 0.0, np.nan))
         self.gains += gain[np.isfinite(gain)].tolist()
-        return found if self.taken is not None else chosen(found, freed, gain > SHOWN)
+        return rows if self.taken is not None else chosen(rows, freed, gain > SHOWN)
 
     def decide(self) -> None:
         """At a group's end."""
@@ -92,11 +92,11 @@ def _decides(group: int, taken: bool | None) -> bool:
 
 
 def fitted_freely(
-    held: Problem, freed: Problem, measured: Measured, noise_dof: Floats, found: FittedRows
+    held: Problem, freed: Problem, measured: MeasuredRows, noise_dof: Floats, rows: FittedRows
 ) -> FittedRows:
     """Rows fitted with a free delay, started from the fit without; where both failed, from several delays."""
-    best = fit_rows(freed, measured, noise_dof, found.ended)
-    lost = np.flatnonzero((found.status != OK) & (found.status != FRICTION) & (best.status != OK))
+    best = fit_rows(freed, measured, noise_dof, rows.ended)
+    lost = np.flatnonzero((rows.status != OK) & (rows.status != FRICTION) & (best.status != OK))
     some, dof = measured[lost], noise_dof[lost]
     for ticks in _TRIED_TICKS if lost.size else ():
         late_s = ticks / freed.grid.rate_hz
@@ -110,7 +110,7 @@ def fitted_freely(
     return best
 
 
-def gains(measured: Measured, noise_dof: Floats, less: FittedRows, more: FittedRows) -> Floats:
+def gains(measured: MeasuredRows, noise_dof: Floats, less: FittedRows, more: FittedRows) -> Floats:
     """Decrease of −2·ln(likelihood) from one fit to the other, (rows,), each with the ε that it needs."""
     before, after = (misfit(measured, x.response, x.dof, noise_dof) for x in (less, more))
     return np.asarray(before - after)

@@ -1,4 +1,4 @@
-"""Whether a machine drifts during a record: a trend of the response at a line that noise does not explain."""
+"""Whether a machine significant during a record: a trend of the response at a line that noise does not explain."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from livebode.core import Lines, Responses, Stage, StatefulBase, sum_exceeded
 
 FALSE_ALARM = 0.01
 """Probability that a record of a machine that does not drift is reported, all lines together."""
-_GROUPS_MAX = 32
-_GROUPS_MIN = 6
+_GROUPS_MAX = 32  # when all are full, neighbours are added: memory does not grow with the record
+_GROUPS_MIN = 6  # with fewer, a trend and its scatter have too few degrees of freedom
 _ROUNDING = 1e-9  # of a response
 _MOVED = 1e-3  # of the largest value of the schedule
 # A trend is at most so far from its middle for the share 1 - 1/e of the record, as noise from its mean within sigma.
@@ -27,7 +27,7 @@ class Drift:
 
     Attributes
     ----------
-    found
+    significant
         Whether the machine drifts: all lines together, at `FALSE_ALARM`.
     lines
         Lines whose own trend is significant.
@@ -38,10 +38,10 @@ class Drift:
         response; NaN at lines with fewer than six groups of windows.
     spread
         Part of the standard deviation of a mean over the record that the trend adds: the mean then covers the response
-        at a random moment of the record as often as noise; 0 unless `found`.
+        at a random moment of the record as often as noise; 0 unless `significant`.
     """
 
-    found: bool
+    significant: bool
     lines: Flags
     value: Complex
     change: Complex
@@ -55,7 +55,7 @@ class DriftTest(StatefulBase):
     Windows that do not overlap are averaged in up to 32 groups of equal length. At each line a parabola over time is
     fitted to the groups, for the change as its straight part, and for the largest distance from the mean. Without
     drift, the power of the straight part over that of the residuals is F(2, 2d), with d the number of groups less
-    three, so that its probability is (1 + F/d)^-d. A record drifts if one line has less than half of `FALSE_ALARM`
+    three, so that its probability is (1 + F/d)^-d. A record significant if one line has less than half of `FALSE_ALARM`
     after Bonferroni, or all lines together have by Fisher's method.
 
     Parameters
@@ -83,11 +83,11 @@ class DriftTest(StatefulBase):
     def add(self, part: Responses) -> None:
         """Process the next responses."""
         chosen: list[int] = []
-        at = int(np.searchsorted(part.first, self._free))
-        while at < len(part):
-            chosen.append(at)
-            self._free = int(part.sample[at]) + 1
-            at = int(np.searchsorted(part.first, self._free))
+        index = int(np.searchsorted(part.first, self._free))
+        while index < len(part):
+            chosen.append(index)
+            self._free = int(part.sample[index]) + 1
+            index = int(np.searchsorted(part.first, self._free))
         if chosen:
             self._add(part[np.array(chosen)])
 
@@ -127,10 +127,10 @@ class DriftTest(StatefulBase):
                 change[i], sigma[i], farthest[i], log_chance[i] = trend
         own = log_chance < np.log(FALSE_ALARM / 2 / max(n, 1))
         together = sum_exceeded(n, -float(log_chance.sum())) < FALSE_ALARM / 2
-        found = bool(own.any() or together)
+        significant = bool(own.any() or together)
         with np.errstate(invalid="ignore", divide="ignore"):
             value = self._pairs[1].sum(axis=0) / self._pairs[2].sum(axis=0)
-        return Drift(found, own, value, change, sigma, _WITHIN_SIGMA * farthest * found)
+        return Drift(significant, own, value, change, sigma, _WITHIN_SIGMA * farthest * significant)
 
     def _trend(self, line: int) -> tuple[complex, float, float, float] | None:
         """Change over the record, its sigma, the largest distance from the mean, and ln of the probability by chance.

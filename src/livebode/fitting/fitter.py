@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,10 +26,62 @@ from livebode.core import (
 from livebode.fitting.delays import DelayChoice
 from livebode.fitting.models import model_named
 from livebode.fitting.physical import DELAY, EvaluationGrid, Hold, PhysicalModel
-from livebode.fitting.problem import Measured, Problem
-from livebode.fitting.rows import FRICTION, NO_RESPONSE, SENTENCES, FittedRows
-from livebode.fitting.tasks import FitTask
+from livebode.fitting.problem import MeasuredRows, Problem
+from livebode.fitting.rows import FRICTION, NO_RESPONSE, SENTENCES, FittedRows, fit_rows
 from livebode.fitting.weights import epsilon_for, squares
+
+
+class FitTask(NamedTuple):
+    """Rows that share a start and an ε: the Responses, the problem, the lines in use with the degrees of freedom of
+    their sigmas, the values from which each row starts, and its ε. None: a scan, and an ε of its own."""
+
+    responses: Responses
+    problem: Problem
+    measured: MeasuredRows
+    noise_dof: Floats
+    start: Floats | None
+    epsilon: Floats | None
+
+    def fitted(self) -> FittedRows:
+        """The rows fitted by themselves."""
+        return fit_rows(self.problem, self.measured, self.noise_dof, self.start, self.epsilon)
+
+    @property
+    def kind(self) -> tuple[object, ...]:
+        """Equal for tasks that one computation can fit."""
+        return *self.problem.identity, self.start is None, self.epsilon is None
+
+
+def fitted_together(tasks: Sequence[FitTask]) -> list[FittedRows]:
+    """The rows of each task; in NumPy, tasks of one kind are one computation."""
+    kinds: dict[tuple[object, ...], list[int]] = {}
+    rows: dict[int, FittedRows] = {}
+    for i, task in enumerate(tasks):
+        if task.problem.native is not None:  # to join the arrays would cost more than it saves
+            rows[i] = task.fitted()
+        else:
+            kinds.setdefault(task.kind, []).append(i)
+    for members in kinds.values():
+        rows.update(zip(members, _fitted_alike([tasks[i] for i in members])))
+    return [rows[i] for i in range(len(tasks))]
+
+
+def _fitted_alike(tasks: Sequence[FitTask]) -> list[FittedRows]:
+    first = tasks[0]
+    if len(tasks) == 1:
+        return [first.fitted()]
+    start, epsilon = _joined([task.start for task in tasks]), _joined([task.epsilon for task in tasks])
+    noise_dof = np.concatenate([task.noise_dof for task in tasks])
+    every = fit_rows(first.problem, MeasuredRows.join([task.measured for task in tasks]), noise_dof, start, epsilon)
+    ends = np.cumsum([len(task.noise_dof) for task in tasks])[:-1]
+    return [FittedRows(*parts) for parts in zip(*(np.split(column, ends) for column in every))]
+
+
+def _joined(parts: Sequence[Floats | None]) -> Floats | None:
+    """The rows of all; tasks of one kind have them all, or none has."""
+    there = [part for part in parts if part is not None]
+    return np.concatenate(there) if there else None
+
 
 _GROUP = 16  # rows that share a start and an ε, however they arrive
 _MEMORY = 64  # rows that ε is taken from
@@ -101,7 +153,7 @@ class Fitter(StatefulBase):
         self._next: Floats | None = None
         self._epsilon: float | None = None
         self._rows: list[tuple[Floats, Floats, Floats]] = []
-        self._unread: list[tuple[Measured, Complex, NDArray[np.int64]]] = []
+        self._unread: list[tuple[MeasuredRows, Complex, NDArray[np.int64]]] = []
         self._delay = DelayChoice()
 
     @property
@@ -159,20 +211,20 @@ class Fitter(StatefulBase):
         start = None if self._start is None else np.repeat(problem.with_held(self._start)[np.newaxis], rows, axis=0)
         return FitTask(part, problem, *measured_of(part, use), start, epsilon)
 
-    def finish(self, task: FitTask, found: FittedRows, emit: Emit = ignore) -> Parameters:
+    def finish(self, task: FitTask, rows: FittedRows, emit: Emit = ignore) -> Parameters:
         """Parameters of a task from its fitted rows; the next task starts from them."""
-        found = self._delay.weigh(self._seen // _GROUP, task.measured, task.noise_dof, found)
-        good = np.flatnonzero(found.status == OK)
-        near = np.flatnonzero((found.status == OK) | (found.status == FRICTION))
+        rows = self._delay.weigh(self._seen // _GROUP, task.measured, task.noise_dof, rows)
+        good = np.flatnonzero(rows.status == OK)
+        near = np.flatnonzero((rows.status == OK) | (rows.status == FRICTION))
         if good.size:
-            self._unread.append((task.measured, found.response, good))
+            self._unread.append((task.measured, rows.response, good))
         if near.size:
-            self._next = found.ended[near[-1]]
+            self._next = rows.ended[near[-1]]
         self._seen += len(task.responses)
         if len(task.responses) and self._seen % _GROUP == 0:
             self._finish_group(task.problem)
             self._delay.decide()
-        parameters = self._parameters(task.responses, found)
+        parameters = self._parameters(task.responses, rows)
         self._report(parameters, emit)
         return parameters
 
@@ -185,7 +237,7 @@ class Fitter(StatefulBase):
         """Parameters that are not fitted, and their values."""
         return Problem(self.model, EvaluationGrid(np.ones(1), 1.0, self._hold), self._fixed, self._free).held
 
-    def start_of(self, responses: Responses, parameters: Parameters) -> tuple[Problem, Measured, Floats]:
+    def start_of(self, responses: Responses, parameters: Parameters) -> tuple[Problem, MeasuredRows, Floats]:
         """The basis of one row's fit: the problem, the lines in use, and the degrees of freedom of its sigmas."""
         measured, noise_dof = measured_of(responses, self._prepare(responses.lines))
         late = DELAY in parameters.names and parameters.sigma[0, parameters.index(DELAY)] > 0
@@ -272,14 +324,14 @@ class Fitter(StatefulBase):
         self._rows = self._rows[-_MEMORY:]
         self._start = self._next
         if len(self._rows) >= _KNOWN:
-            rest, noise, size = (np.concatenate(part)[np.newaxis] for part in zip(*self._rows))
+            residual, noise, size = (np.concatenate(part)[np.newaxis] for part in zip(*self._rows))
             dof = 2.0 * np.count_nonzero(size) - problem.size * len(self._rows)
-            self._epsilon = float(epsilon_for(rest, noise, size, np.array([dof]))[0])
+            self._epsilon = float(epsilon_for(residual, noise, size, np.array([dof]))[0])
 
-    def _parameters(self, responses: Responses, found: FittedRows) -> Parameters:
+    def _parameters(self, responses: Responses, rows: FittedRows) -> Parameters:
         return Parameters(
-            model=self.model.name, names=self.model.names, units=self.model.units, value=found.values,
-            covariance=found.covariance, status=found.status, epsilon=found.epsilon, chi2=found.chi2, dof=found.dof,
+            model=self.model.name, names=self.model.names, units=self.model.units, value=rows.values,
+            covariance=rows.covariance, status=rows.status, epsilon=rows.epsilon, chi2=rows.chi2, dof=rows.dof,
             sample=responses.sample, time_s=responses.time_s, schedule=responses.schedule,
         )  # fmt: skip
 
@@ -292,7 +344,7 @@ class Fitter(StatefulBase):
             emit(Event(kind, sample, time_s, SENTENCES[self._word], {"status": self._word}))
 
 
-def measured_of(responses: Responses, use: NDArray[np.bool_]) -> tuple[Measured, Floats]:
+def measured_of(responses: Responses, use: NDArray[np.bool_]) -> tuple[MeasuredRows, Floats]:
     """The lines in use as rows to fit, and the degrees of freedom of their sigmas."""
     value, sigma, valid = responses.value, responses.sigma, responses.valid
     if not use.all():
@@ -302,4 +354,4 @@ def measured_of(responses: Responses, use: NDArray[np.bool_]) -> tuple[Measured,
     known = np.isfinite(sigma) | ~usable
     if not known.all():
         sigma = np.where(known.all(axis=1, keepdims=True), sigma, np.nan)
-    return Measured(value, sigma, usable), responses.dof
+    return MeasuredRows(value, sigma, usable), responses.dof

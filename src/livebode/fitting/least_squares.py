@@ -14,7 +14,7 @@ Normal = Callable[[Floats], tuple[Any, ...]]
 """From parameters (problems, n): cost (problems,), gradient (problems, n), Gauss–Newton matrix (problems, n, n), and
 further arrays (problems, …) that are reported for the best point."""
 
-_RISE, _FALL = 10.0, 0.2
+_RISE, _FALL = 10.0, 0.2  # factors of Marquardt's damping after a step that raised, or lowered, the cost
 _STEP_MAX = 0.7  # of a logarithm: a factor of two
 
 

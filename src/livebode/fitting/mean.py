@@ -1,4 +1,4 @@
-"""The mean of many responses, with its bounds from their scatter."""
+"""The mean of many responses, with its bounds from their scatter, and of many matrices."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Floats
-from livebode.core import Response, Responses, SignalError
+from livebode.core import FitError, MatrixResponses, Response, Responses, SignalError
 from livebode.fitting.drift import DriftTest
 
 _FIRST_VERDICT = 3  # windows that may be valid before the first verdict: three periods, of which two are complete
@@ -184,14 +184,14 @@ class RunningMean:
 
         Sigma is NaN at a line with fewer than two windows.
         """
-        one = self.response()[0]
+        response = self.response()[0]
         if self.averages:
-            of_noise = np.sqrt(np.maximum(one.sigma**2 - np.nan_to_num(one.distortion, posinf=0.0) ** 2, 0.0))
-            return replace(one, sigma=of_noise), one.weight
-        scatter, windows = self._scatter(one.valid)
+            of_noise = np.sqrt(np.maximum(response.sigma**2 - np.nan_to_num(response.distortion, posinf=0.0) ** 2, 0.0))
+            return replace(response, sigma=of_noise), response.weight
+        scatter, windows = self._scatter(response.valid)
         several = windows >= 2
         dof = float(np.min(windows - 1, where=several, initial=np.inf))
-        return replace(one, sigma=np.where(several, scatter, np.nan), dof=dof), self._pair.denominator
+        return replace(response, sigma=np.where(several, scatter, np.nan), dof=dof), self._pair.denominator
 
     def _scatter(self, valid: NDArray[np.bool_]) -> tuple[Floats, Floats]:
         """Standard deviation of the mean by the scatter of the responses, and the number of windows without overlap."""
@@ -232,15 +232,15 @@ class RunningMean:
         )
 
 
-def _without(one: Responses, lines: NDArray[np.bool_]) -> Responses:
+def _without(response: Responses, lines: NDArray[np.bool_]) -> Responses:
     """The responses with these lines invalid."""
     nothing = complex(np.nan, np.nan)
     return replace(
-        one,
-        value=np.where(lines, nothing, one.value),
-        sigma=np.where(lines, np.nan, one.sigma),
-        weight=np.where(lines, nothing, one.weight),
-        valid=one.valid & ~lines,
+        response,
+        value=np.where(lines, nothing, response.value),
+        sigma=np.where(lines, np.nan, response.sigma),
+        weight=np.where(lines, nothing, response.weight),
+        valid=response.valid & ~lines,
     )
 
 
@@ -319,3 +319,66 @@ class _Overlap:
         self._done = until
         still = self._stop > until
         self._stop, self._used = self._stop[still], self._used[still]
+
+
+def mean_matrix(responses: MatrixResponses) -> MatrixResponses:
+    """The mean of the rows that share no window, from the newest backwards, as one row; it needs at least one row.
+
+    A row that contains all repetitions is retained as it is. Rows of fewer repetitions, as early in a run, have less
+    weight: that of value and time is the reciprocal of the row's `spread`, that of `noise` the row's degrees of
+    freedom. The noise of rows may be from the same windows, so its degrees of freedom are their mean with these
+    weights, or those between the rows if these are more. A column is valid where it is in all rows used.
+
+    Raises
+    ------
+    FitError
+        If there is no row with a valid column and a known noise.
+
+    Examples
+    --------
+    >>> from livebode_matrix import example_matrix_responses
+    >>> mean_matrix(example_matrix_responses())
+    <MatrixResponses: 1 rows, 7 lines, 2 outputs × 2 inputs>
+    """
+    known = responses.valid.any(axis=(1, 2)) & (responses.dof > 0)
+    if not known.any():
+        raise FitError(
+            "too-few-lines",
+            "no matrix has a valid column and a known noise",
+            "repeat the experiments: bounds need two repetitions with average, three without it",
+            lines=0,
+        )
+    rows = _without_overlap(responses, np.flatnonzero(known))
+    return _weighted(responses[rows])
+
+
+def _without_overlap(responses: MatrixResponses, rows: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Numbers of the rows that share no window, chosen from the newest backwards; ascending."""
+    chosen: list[int] = []
+    for row in rows[::-1]:
+        if not chosen or responses.sample[row] < responses.first[chosen[-1]]:
+            chosen.append(int(row))
+    return np.array(chosen[::-1], dtype=np.intp)
+
+
+def _weighted(of: MatrixResponses) -> MatrixResponses:
+    between = (len(of) - 1.0) * len(of.inputs)
+    with np.errstate(invalid="ignore"):
+        weight = 1.0 / np.einsum("rkii->rk", of.spread).real
+        weight = (weight / weight.sum(axis=0))[:, :, np.newaxis, np.newaxis]
+        return MatrixResponses(
+            of.lines,
+            of.outputs,
+            of.inputs,
+            np.sum(weight * of.value, axis=0, keepdims=True),
+            np.average(of.noise, axis=0, weights=of.dof)[np.newaxis],
+            np.sum(weight**2 * of.spread, axis=0, keepdims=True),
+            np.array([max(float(np.average(of.dof, weights=of.dof)), between)]),
+            np.mean(of.coherence, axis=0, keepdims=True),
+            np.max(of.condition, axis=0, keepdims=True),
+            of.reason.max(axis=0, keepdims=True),
+            of.first[:1],
+            of.sample[-1:],
+            np.array([float(np.average(of.time_s, weights=np.nanmean(weight, axis=(1, 2, 3))))]),
+            of.units,
+        )

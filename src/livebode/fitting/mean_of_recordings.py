@@ -20,7 +20,7 @@ _RECORDINGS_MIN = 2
 
 
 @dataclass(frozen=True, eq=False)
-class Between:
+class RecordingScatter:
     """How several recordings scatter about their mean; shapes (lines,).
 
     Attributes
@@ -132,7 +132,7 @@ class RecordingsMean:
         """The present mean; SignalError if fewer than two recordings have a valid line in common."""
         return self.result()[0]
 
-    def result(self) -> tuple[Responses, Between]:
+    def result(self) -> tuple[Responses, RecordingScatter]:
         """The present mean, and how the recordings scatter about it; SignalError as `response`."""
         ones, each = self._each()
         with np.errstate(invalid="ignore", divide="ignore"):
@@ -144,7 +144,7 @@ class RecordingsMean:
             repeated = _mean_of(np.abs(weights), each.repeated)
         valid = each.count >= _RECORDINGS_MIN
         newest = ones[-1]
-        one = replace(
+        response = replace(
             newest,
             value=np.where(valid, value, complex(np.nan, np.nan)),
             sigma=np.where(valid, np.sqrt(sigma**2 + repeated), np.nan),
@@ -152,40 +152,40 @@ class RecordingsMean:
             coherence=_over(ones, "coherence"),
             valid=valid,
             first=ones[0].first,
-            time_s=float(np.mean([one.time_s for one in ones])),
-            schedule=float(np.mean([one.schedule for one in ones])),
+            time_s=float(np.mean([response.time_s for response in ones])),
+            schedule=float(np.mean([response.schedule for response in ones])),
             input_coherence=_over(ones, "input_coherence"),
             weight=np.full(len(valid), complex(np.nan, np.nan)),
             distortion=self._distortion(ones, valid),
         )
-        return Responses.of(one), between
+        return Responses.of(response), between
 
     def _each(self) -> tuple[list[Response], _Each]:
-        ones, weights, repeated = [], [], []
+        responses, weights, repeated = [], [], []
         for mean in self._means:
             try:
-                one, weight = mean.without_distortion()
+                response, weight = mean.without_distortion()
             except SignalError:
                 continue
-            ones.append(one)
+            responses.append(response)
             weights.append(np.where(np.isfinite(weight), weight, 1.0))
-            spread = np.zeros(len(one.lines)) if mean.averages else mean.drift.result().spread
-            distortion = np.where(np.isfinite(one.distortion) & (not self.realisations), one.distortion, 0.0)
+            spread = np.zeros(len(response.lines)) if mean.averages else mean.drift.result().spread
+            distortion = np.where(np.isfinite(response.distortion) & (not self.realisations), response.distortion, 0.0)
             repeated.append(spread**2 + distortion**2)
-        valid = np.array([one.valid for one in ones])
-        if not ones or np.all(valid.sum(axis=0) < _RECORDINGS_MIN):
+        valid = np.array([response.valid for response in responses])
+        if not responses or np.all(valid.sum(axis=0) < _RECORDINGS_MIN):
             raise SignalError(
                 "no-valid-response",
                 "no line is valid in two of the recordings",
                 "see the run's events for the reason at each line, or track each recording in a run of its own",
             )
-        value = np.where(valid, np.array([one.value for one in ones]), complex(np.nan, np.nan))
-        sigma = np.where(valid, np.array([one.sigma for one in ones]), np.nan)
+        value = np.where(valid, np.array([response.value for response in responses]), complex(np.nan, np.nan))
+        sigma = np.where(valid, np.array([response.sigma for response in responses]), np.nan)
         rounding = (_ROUNDING * np.abs(value)) ** 2
-        dof = np.array([one.dof for one in ones])[:, np.newaxis]
-        return ones, _Each(value, np.array(weights), sigma**2 + rounding, dof, np.array(repeated))
+        dof = np.array([response.dof for response in responses])[:, np.newaxis]
+        return responses, _Each(value, np.array(weights), sigma**2 + rounding, dof, np.array(repeated))
 
-    def _between(self, each: _Each, weights: Complex, value: Complex, chance: float) -> Between:
+    def _between(self, each: _Each, weights: Complex, value: Complex, chance: float) -> RecordingScatter:
         size, count = np.abs(weights), each.count
         noise = np.nansum(size**2 * each.variance, axis=0) / np.abs(np.nansum(weights, axis=0)) ** 2
         noise[np.isnan(np.where(each.used, each.variance, 0.0)).any(axis=0)] = np.nan
@@ -201,7 +201,7 @@ class RecordingsMean:
         noise, total, distortion = (
             np.where(alone, np.nan, np.sqrt(np.maximum(part, 0.0))) for part in (noise, total, distortion)
         )
-        return Between(len(each.value), noise, total, distortion, distortion_db, noise_db, chance)
+        return RecordingScatter(len(each.value), noise, total, distortion, distortion_db, noise_db, chance)
 
     def _distortion(self, ones: Sequence[Response], valid: Flags) -> Floats:
         if self.realisations:
@@ -214,9 +214,9 @@ def _mean(values: Floats) -> Floats:
     return _mean_of(np.ones(values.shape), values)
 
 
-def _over(ones: Sequence[Response], name: str, power: int = 1) -> Floats:
+def _over(responses: Sequence[Response], name: str, power: int = 1) -> Floats:
     """Mean over the recordings in which it is known, (lines,)."""
-    values = np.array([getattr(one, name) for one in ones]) ** power
+    values = np.array([getattr(response, name) for response in responses]) ** power
     return _mean(values)
 
 
@@ -255,18 +255,18 @@ def _beyond_noise(each: _Each) -> tuple[Floats, Floats, Floats]:
     weights = 1 / _noise(each)
     total = np.nansum(weights, axis=0)
     mean = np.nansum(weights * each.value, axis=0) / total
-    found = np.nansum(weights * np.abs(each.value - mean) ** 2, axis=0)
+    scatter = np.nansum(weights * np.abs(each.value - mean) ** 2, axis=0)
     # NaN where the noise of a recording is not known.
     own = np.where(each.used, each.variance, 0.0)
     by_noise = np.sum(np.where(each.used, weights, 0.0) * own, axis=0)
     by_noise = by_noise - np.sum(np.where(each.used, weights, 0.0) ** 2 * own, axis=0) / total
     spread = total - np.nansum(weights**2, axis=0) / total
-    return (found - by_noise) / spread, found, by_noise
+    return (scatter - by_noise) / spread, scatter, by_noise
 
 
 def _excess(each: _Each) -> tuple[Floats, float]:
     """Variance between recordings beyond noise, smooth over the lines, and the probability of it by chance."""
-    beyond, found, by_noise = _beyond_noise(each)
+    beyond, scatter, by_noise = _beyond_noise(each)
     judged = (each.count >= _RECORDINGS_MIN) & (by_noise > 0)
     noise = _mean(np.where(each.used, each.variance, np.nan))
     excess = np.maximum(_smooth(np.where(judged, beyond / noise, np.nan)), 0.0) * noise
@@ -274,8 +274,8 @@ def _excess(each: _Each) -> tuple[Floats, float]:
         return np.zeros(each.value.shape[1]), np.nan
     free = 2 * (each.count[judged] - 1)
     of_noise = 2 * np.sum(np.where(each.used[:, judged], each.dof, 0.0), axis=0)
-    ratio = found[judged] / by_noise[judged]
-    p = np.array([f_exceeded(*one) for one in zip(ratio, free, of_noise)])
+    ratio = scatter[judged] / by_noise[judged]
+    p = np.array([f_exceeded(*arguments) for arguments in zip(ratio, free, of_noise)])
     log_p = np.log(np.maximum(p, 1e-300))
     together = sum_exceeded(p.size, -log_p.sum())
     chance = min(1.0, 2 * min(together, float(p.min()) * p.size))
@@ -287,7 +287,7 @@ def _weights(each: _Each, excess: Floats) -> Complex:
     return np.asarray(each.weight / _mean(np.abs(each.weight)) / size / (_noise(each) + excess))
 
 
-def _sigma(each: _Each, weights: Complex, between: Between, excess: Floats) -> tuple[Floats, float]:
+def _sigma(each: _Each, weights: Complex, between: RecordingScatter, excess: Floats) -> tuple[Floats, float]:
     """Sigma of the mean (lines,) and its degrees of freedom."""
     several = each.count >= _RECORDINGS_MIN
     if between.differs or np.isnan(between.noise[several]).any():

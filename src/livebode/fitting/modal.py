@@ -13,8 +13,8 @@ from livebode.fitting.transfer import Transfer
 QUALITY = 10.0
 """Quality factor of the scanned resonances; Table I of Nevaranta 2016 has it."""
 
-_SCANNED = {0: 1, 1: 48, 2: 20}
-_TRIED = {0: 1, 1: 4, 2: 16}
+_SCANNED = {0: 1, 1: 48, 2: 20}  # frequencies by number of modes; for two modes all pairs are tried, 190 of 20
+_TRIED = {0: 1, 1: 4, 2: 16}  # by number of modes: with more of them there are more local minima
 _LEAST = 1e-3  # of the largest weight, for one that is negative
 
 
@@ -30,8 +30,8 @@ def scan(
     f = grid.frequency_hz
     omegas = 2 * np.pi * np.geomspace(f.min() / 2, f.max() * 2, _SCANNED[modes])
     rigid = _part([1.0], [1.0] + [0.0] * integrators, grid)
-    rest = [0.0] * (integrators - 1)
-    shapes = [_part([1.0, 0.0], [1.0, w / QUALITY, w * w, *rest], grid) for w in omegas]
+    integrator_zeros = [0.0] * (integrators - 1)
+    shapes = [_part([1.0, 0.0], [1.0, w / QUALITY, w * w, *integrator_zeros], grid) for w in omegas]
     sets = np.array(list(combinations(range(len(omegas)), modes)), dtype=int)
     basis = np.array([[rigid, *(shapes[i] for i in chosen)] for chosen in sets])
     if ratio is not None:

@@ -10,18 +10,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from livebode.core import FitError, Parameters, Response, Responses, not_installed
-from livebode.fitting.competitors import AllowedChanges, Competitor, compete, competitor, mixed, positive
-from livebode.fitting.extended_model import WORDS
+from livebode.fitting.competitors import WORDS, AllowedChanges, Competitor, compete, competitor, mixed, positive
 from livebode.fitting.fitter import Fitter
-from livebode.fitting.hold import to_discrete
 from livebode.fitting.mean import mean_response
 from livebode.fitting.patterns import correlation, covariance, follows_pattern
 from livebode.fitting.physical import DELAY, EvaluationGrid, Hold, PhysicalModel
-from livebode.fitting.problem import Measured
+from livebode.fitting.problem import MeasuredRows
 from livebode.fitting.rows import NO_FIT, SENTENCES, fit_rows
+from livebode.fitting.transfer import to_discrete
 from livebode.language import Message
 
-_ROUNDING = 1e-9
+_ROUNDING = 1e-9  # of a value: rounding gives a quantity of fixed values a bound of this size
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,12 +96,12 @@ class Fit:
         status = np.full(1, NO_FIT, dtype=part.status.dtype)
         blank = [
             replace(
-                one,
-                value=np.full_like(one.value, np.nan),
-                covariance=np.full_like(one.covariance, np.nan),
+                table,
+                value=np.full_like(table.value, np.nan),
+                covariance=np.full_like(table.covariance, np.nan),
                 status=status,
             )
-            for one in (part, self.derived)
+            for table in (part, self.derived)
         ]
         return replace(self, parameters=blank[0], derived=blank[1], refusal=reason)
 
@@ -174,8 +173,8 @@ class Fit:
             If the fit failed.
         """
         f = np.asarray(frequency_hz, dtype=np.float64)
-        found = self.model.at(self._values(), EvaluationGrid(f.ravel(), self.rate_hz, self.hold))
-        return np.asarray(found.reshape(f.shape))
+        response = self.model.at(self._values(), EvaluationGrid(f.ravel(), self.rate_hz, self.hold))
+        return np.asarray(response.reshape(f.shape))
 
     def to_control(self, discrete: bool = False) -> Any:
         """python-control TransferFunction (extra `control`): in s, without the delay; or in z, behind hold and delay.
@@ -201,15 +200,15 @@ class Fit:
 
     def rows(self, probability: float = 0.95) -> list[tuple[str, float, float, str]]:
         """Name, value, half-width and unit of all fitted and derived quantities; 0 where fixed values determine it."""
-        found = []
+        rows = []
         for part in (self.parameters, self.derived):
             bound = part.bound(probability)[0]
             for i, name in enumerate(part.names):
                 if name not in self.held:
                     value, half = float(part.value[0, i]), float(bound[i])
                     # What follows from fixed values alone has the rounding of its slopes as a bound.
-                    found.append((name, value, 0.0 if half <= _ROUNDING * abs(value) else half, part.units[i]))
-        return found
+                    rows.append((name, value, 0.0 if half <= _ROUNDING * abs(value) else half, part.units[i]))
+        return rows
 
     def _values(self) -> NDArray[np.float64]:
         if self.status != "ok":
@@ -257,27 +256,27 @@ def fit(
     >>> round(found["Keff"]), round(found["mL"], 4), round(found["resonance"], 3)
     (500000, 6.7, 59.357)
     """
-    one = mean_response(measured) if isinstance(measured, Responses) else Responses.of(measured)
+    mean = mean_response(measured) if isinstance(measured, Responses) else Responses.of(measured)
     fitter = Fitter(model, fixed=fixed, free=free, band_hz=band_hz, hold=hold, **options)
-    return best_of(fitter, fitter.process(one), one)
+    return best_of(fitter, fitter.process(mean), mean)
 
 
 def best_of(fitter: Fitter, parameters: Parameters, measured: Responses) -> Fit:
     """One row of a Fitter, after a competition with extended models (docs/explanation/fits.md)."""
-    found = fit_of(fitter, parameters, measured)
-    if found.status != "ok":
-        return found
+    plain = fit_of(fitter, parameters, measured)
+    if plain.status != "ok":
+        return plain
     problem, rows, noise_dof = fitter.start_of(measured, parameters)
     fitted = fit_rows(problem, rows, noise_dof, parameters.value)
     if fitted.status[0] != "ok":
-        return found
-    allowed = AllowedChanges(fitter.fixed, fitter.may_take_delay(), found.band_hz[1])
+        return plain
+    allowed = AllowedChanges(fitter.fixed, fitter.may_take_delay(), plain.band_hz[1])
     late = (DELAY,) if problem is not fitter.problem else ()
     every = compete(competitor(problem, rows, noise_dof, fitted, late), rows, noise_dof, allowed)
-    return _chosen(found, every, rows, noise_dof)
+    return _chosen(plain, every, rows, noise_dof)
 
 
-def _chosen(found: Fit, every: list[Competitor], rows: Measured, noise_dof: NDArray[np.float64]) -> Fit:
+def _chosen(plain: Fit, every: list[Competitor], rows: MeasuredRows, noise_dof: NDArray[np.float64]) -> Fit:
     """The best competitor as a Fit, with bounds that include the choice and its own model error."""
     pattern = None
     if follows_pattern(rows, every[0].fitted, noise_dof):
@@ -289,12 +288,12 @@ def _chosen(found: Fit, every: list[Competitor], rows: Measured, noise_dof: NDAr
     if pattern is not None:
         whole = whole + positive(covariance(problem, rows, fitted) - fitted.covariance[0])
     parameters = replace(
-        found.parameters, model=model.name, names=model.names, units=model.units, value=fitted.values,
+        plain.parameters, model=model.name, names=model.names, units=model.units, value=fitted.values,
         covariance=whole[np.newaxis], status=fitted.status, epsilon=fitted.epsilon, chi2=fitted.chi2, dof=fitted.dof,
     )  # fmt: skip
     derived = parameters.derived(model.derived_names, model.derived_units, model.derived)
     return replace(
-        found, model=model, parameters=parameters, derived=derived, held=problem.held, taken=every[0].taken,
+        plain, model=model, parameters=parameters, derived=derived, held=problem.held, taken=every[0].taken,
         correlation=pattern,
     )  # fmt: skip
 

@@ -123,9 +123,9 @@ class PartialFractions:
 
     def pairs(self, a1: Floats, a0: Floats, delay_s: float = 0.0) -> Complex:
         """Both columns of pairs (...), shape (..., 2, lines)."""
-        none, one, unit = np.zeros_like(a1), np.ones_like(a1), self.unit
-        above = [np.stack(part, axis=-1) for part in ((none, unit * one), (unit**2 * one, none))]
-        below = [part[..., np.newaxis] for part in (one, a1, a0)]
+        none, ones, unit = np.zeros_like(a1), np.ones_like(a1), self.unit
+        above = [np.stack(part, axis=-1) for part in ((none, unit * ones), (unit**2 * ones, none))]
+        below = [part[..., np.newaxis] for part in (ones, a1, a0)]
         return self._at(Transfer.of(above, below), delay_s)
 
     def real(self, a: Floats, delay_s: float = 0.0) -> Complex:
@@ -155,8 +155,8 @@ class PartialFractions:
         pairs = self.structure.pairs_of(theta)
         size = np.sqrt(np.abs(pairs[:, 1])) + 1e-9 * self.unit
         both = np.stack([_STEP * size, _STEP * size**2], axis=-1).ravel()
-        rest = theta[2 * self.structure.pairs : self.structure.poles]
-        return np.concatenate([both, _STEP * (np.abs(rest) + 1e-3 * self.unit)])
+        reals = theta[2 * self.structure.pairs : self.structure.poles]
+        return np.concatenate([both, _STEP * (np.abs(reals) + 1e-3 * self.unit)])
 
 
 class PoleQuantities:
@@ -185,17 +185,17 @@ class PoleQuantities:
         self._modes = [int(i) for i in order if a1[i] ** 2 < 4 * a0[i]]
         self._real = [int(i) for i in order if i not in self._modes]
         modes, reals = len(self._modes), 2 * len(self._real) + structure.single
-        poles = [(f"{what}_{i + 1}", of) for i in range(modes) for what, of in (("frequency", "Hz"), ("damping", ""))]
+        poles = [(f"{name}_{i + 1}", of) for i in range(modes) for name, of in (("frequency", "Hz"), ("damping", ""))]
         poles += [(f"pole_{i + 1}", "Hz") for i in range(reals)]
-        rest = []
+        others = []
         for output, u in zip(outputs, units):
             per_s = f"({u})/s" if u else "1/s"
             for i in range(modes):
-                rest += [(f"residue_{i + 1} {output}", per_s), (f"phase_{i + 1} {output}", "°")]
-            rest += [(f"residue of pole_{i + 1} {output}", per_s) for i in range(reals)]
-            rest += [(f"1/s{'²' * (i > 0)} {output}", per_s + "²" * (i > 0)) for i in range(structure.integrators)]
-            rest += [(f"delay {output}", "s")] * structure.delays
-        self.names, self.units = tuple(n for n, _ in poles + rest), tuple(u for _, u in poles + rest)
+                others += [(f"residue_{i + 1} {output}", per_s), (f"phase_{i + 1} {output}", "°")]
+            others += [(f"residue of pole_{i + 1} {output}", per_s) for i in range(reals)]
+            others += [(f"1/s{'²' * (i > 0)} {output}", per_s + "²" * (i > 0)) for i in range(structure.integrators)]
+            others += [(f"delay {output}", "s")] * structure.delays
+        self.names, self.units = tuple(n for n, _ in poles + others), tuple(u for _, u in poles + others)
         self.certain = [i for i, name in enumerate(self.names) if name.startswith("frequency_")]
         """Positions of the frequencies, whose uncertainty decides whether the lines show the modes."""
         self._like = like

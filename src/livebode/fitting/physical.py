@@ -15,6 +15,31 @@ from livebode.arrays import Complex, Floats
 from livebode.core import Lines, UsageError
 from livebode.fitting.transfer import Transfer, roots
 
+
+def times(first: list[Any], second: list[Any]) -> list[Any]:
+    """Product of two polynomials.
+
+    >>> times([1.0, 2.0], [1.0, 3.0])
+    [1.0, 5.0, 6.0]
+    """
+    product: list[Any] = [0.0] * (len(first) + len(second) - 1)
+    for i, a in enumerate(first):
+        for j, b in enumerate(second):
+            product[i + j] = product[i + j] + a * b
+    return product
+
+
+def plus(first: list[Any], second: list[Any]) -> list[Any]:
+    """Sum of two polynomials.
+
+    >>> plus([1.0, 0.0, 2.0], [5.0, 1.0])
+    [1.0, 5.0, 3.0]
+    """
+    short, long = sorted((first, second), key=len)
+    offset = len(long) - len(short)
+    return [x + (short[i - offset] if i >= offset else 0.0) for i, x in enumerate(long)]
+
+
 Hold = Literal["zero-order", "none"]
 
 DELAY = "delay"
@@ -246,7 +271,7 @@ def _paired(polynomial: Floats) -> tuple[Floats, Floats]:
     """
     if polynomial.shape[-1] == 3:
         return polynomial[..., 2:] / polynomial[..., :1], -polynomial[..., 1:2] / polynomial[..., :1]
-    found = roots(polynomial)
-    left = found.shape[-1] % 2
-    one, other = found[..., left::2], found[..., left + 1 :: 2]
-    return np.abs(one * other), (one + other).real
+    ordered = roots(polynomial)
+    left = ordered.shape[-1] % 2
+    first, second = ordered[..., left::2], ordered[..., left + 1 :: 2]
+    return np.abs(first * second), (first + second).real

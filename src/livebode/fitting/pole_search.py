@@ -10,12 +10,12 @@ import numpy as np
 
 from livebode.arrays import Complex, Floats
 from livebode.fitting.partial_fractions import PartialFractions, Structure, poles_of
-from livebode.fitting.separable import Outputs, Separated, left_over, solve, stacked
+from livebode.fitting.separable import Outputs, SeparatedFit, left_over, solve, stacked
 
 Kind = Literal["modal", "rational"]
 
 ORDER_MAX = {"modal": 20, "rational": 40}
-_INTEGRATORS = 2
+_INTEGRATORS = 2  # at most: from torque to position
 _DIRECT = {"modal": 2, "rational": 1}
 _IN_VAIN = {"modal": 2, "rational": 4}  # orders in a row without a lower cost end the search
 _TRIED = 3  # starts for each added pole
@@ -25,58 +25,63 @@ _BEYOND = 1.5  # times the highest line, or the lowest line over it: a mode outs
 _NARROW = 0.1  # of the spacing of lines, for the half-width of a mode
 _FAR = 30.0  # times the highest line, or the lowest line over it: a pole outside is an integrator or a direct term
 _EVALUATIONS_FIRST = 12  # of a start, before the best one is continued
-_ROUNDS_SEARCH, _ROUNDS_LAST = 2, 8
+_ROUNDS_SEARCH, _ROUNDS_LAST = 2, 8  # of reweighting: a search only compares costs, the result needs ε to converge
 _ROUGH = 0.1  # model error with which a delay cannot be told from missing poles
 _EARLIEST_TICKS, _LATEST_TICKS, _LATEST_S = 2.0, 5.0, 0.02
 
 
-def search(outputs: Outputs, kind: Kind, order: int | None = None) -> list[Separated]:
+def search(outputs: Outputs, kind: Kind, order: int | None = None) -> list[SeparatedFit]:
     """The best fits, by increasing cost; of one order only where it is specified.
 
     The order of "modal" is the number of modes, that of "rational" the number of poles without integrators. A search
     ends where two further orders in a row do not lower the cost.
     """
-    grown: dict[int, Separated] = {}
-    for at in range((ORDER_MAX[kind] if order is None else order) + 1):
-        begun = [one for step in (1, 2) if at - step in grown for one in _grown(outputs, grown[at - step], kind, step)]
-        begun = [one for one in begun if possible(outputs, one, kind)] or begun
-        if at == 0:
+    grown: dict[int, SeparatedFit] = {}
+    for degree in range((ORDER_MAX[kind] if order is None else order) + 1):
+        begun = [
+            fitted
+            for step in (1, 2)
+            if degree - step in grown
+            for fitted in _grown(outputs, grown[degree - step], kind, step)
+        ]
+        begun = [fitted for fitted in begun if possible(outputs, fitted, kind)] or begun
+        if degree == 0:
             begun = [_begun(outputs, kind)]
         if not begun:
             continue
-        best = min(begun, key=lambda one: one.cost)
+        best = min(begun, key=lambda fitted: fitted.cost)
         best = solve(outputs, best.structure, best.theta, rounds=_ROUNDS_SEARCH)
-        grown[at] = min([best, *_delayed(outputs, best)], key=lambda one: one.cost)
-        if order is None and at - min(grown, key=lambda i: grown[i].cost) >= _IN_VAIN[kind]:
+        grown[degree] = min([best, *_delayed(outputs, best)], key=lambda fitted: fitted.cost)
+        if order is None and degree - min(grown, key=lambda i: grown[i].cost) >= _IN_VAIN[kind]:
             break
     if order is not None:
         return [_reduced(outputs, grown[order], kind, fixed=True)] if order in grown else []
-    return _finished(outputs, sorted(grown.values(), key=lambda one: one.cost), kind)
+    return _finished(outputs, sorted(grown.values(), key=lambda fitted: fitted.cost), kind)
 
 
-def _finished(outputs: Outputs, grown: list[Separated], kind: Kind) -> list[Separated]:
+def _finished(outputs: Outputs, grown: list[SeparatedFit], kind: Kind) -> list[SeparatedFit]:
     """The best one reduced, and those that may become better with the same terms."""
-    found: list[Separated] = []
-    for one in grown:
-        best = min(found, key=lambda other: other.cost, default=None)
+    finished: list[SeparatedFit] = []
+    for fitted in grown:
+        best = min(finished, key=lambda other: other.cost, default=None)
         if best is not None:
             # What a reduction can gain is known: an order that is worse by more cannot become the best.
             gain = (_INTEGRATORS + _DIRECT[kind] + 1) * len(outputs.measured) * np.log(outputs.count)
-            if one.cost > best.cost + gain:
+            if fitted.cost > best.cost + gain:
                 break
             alike = replace(
-                one.structure, integrators=best.structure.integrators, direct=best.structure.direct,
-                delays=best.structure.delays and one.structure.delays,
+                fitted.structure, integrators=best.structure.integrators, direct=best.structure.direct,
+                delays=best.structure.delays and fitted.structure.delays,
             )  # fmt: skip
-            one = solve(outputs, alike, one.theta[: alike.nonlinear], rounds=_ROUNDS_SEARCH)
-            if one.cost >= best.cost:
-                found.append(one)
+            fitted = solve(outputs, alike, fitted.theta[: alike.nonlinear], rounds=_ROUNDS_SEARCH)
+            if fitted.cost >= best.cost:
+                finished.append(fitted)
                 continue
-        found.append(_reduced(outputs, one, kind))
-    return sorted((one for one in found if possible(outputs, one, kind)), key=lambda one: one.cost)
+        finished.append(_reduced(outputs, fitted, kind))
+    return sorted((fitted for fitted in finished if possible(outputs, fitted, kind)), key=lambda fitted: fitted.cost)
 
 
-def possible(outputs: Outputs, of: Separated, kind: Kind) -> bool:
+def possible(outputs: Outputs, of: SeparatedFit, kind: Kind) -> bool:
     """Whether its poles are of the kind, and its delays are such that logging or a sensor can cause."""
     delays = of.structure.delays_of(of.theta) * outputs.grid.rate_hz
     latest = max(_LATEST_TICKS, _LATEST_S * outputs.grid.rate_hz)
@@ -93,7 +98,7 @@ def possible(outputs: Outputs, of: Separated, kind: Kind) -> bool:
     return bool((damped & (a1**2 < 4 * a0) & between).all())
 
 
-def _delayed(outputs: Outputs, of: Separated) -> list[Separated]:
+def _delayed(outputs: Outputs, of: SeparatedFit) -> list[SeparatedFit]:
     """This model with a delay of each output."""
     wider = replace(of.structure, delays=True)
     if of.structure.delays or np.max(of.epsilon) > _ROUGH or not outputs.enough_for(wider):
@@ -102,7 +107,7 @@ def _delayed(outputs: Outputs, of: Separated) -> list[Separated]:
     return [solve(outputs, wider, start, rounds=_ROUNDS_SEARCH)]
 
 
-def _begun(outputs: Outputs, kind: Kind) -> Separated:
+def _begun(outputs: Outputs, kind: Kind) -> SeparatedFit:
     """No poles but integrators, with as many direct terms as the lines allow."""
     for integrators, direct in ((_INTEGRATORS, _DIRECT[kind]), (1, 1), (1, 0)):
         structure = Structure(len(outputs.measured), integrators=integrators, direct=direct)
@@ -111,7 +116,7 @@ def _begun(outputs: Outputs, kind: Kind) -> Separated:
     return solve(outputs, structure, np.empty(0), rounds=_ROUNDS_LAST)
 
 
-def _grown(outputs: Outputs, of: Separated, kind: Kind, step: int) -> Iterator[Separated]:
+def _grown(outputs: Outputs, of: SeparatedFit, kind: Kind, step: int) -> Iterator[SeparatedFit]:
     """Fits with one more order of poles: a pair is an order of "modal" and two of "rational"."""
     before = of.structure
     if kind == "modal" or step == 2:
@@ -124,21 +129,21 @@ def _grown(outputs: Outputs, of: Separated, kind: Kind, step: int) -> Iterator[S
         ]
     elif before.single:
         wider = replace(before, pairs=before.pairs + 1, single=0)
-        own, at = of.theta[before.poles - 1], before.poles
+        own, index = of.theta[before.poles - 1], before.poles
         starts = [
-            np.concatenate([of.theta[: at - 1], [own + other, own * other], of.theta[at:]])
+            np.concatenate([of.theta[: index - 1], [own + other, own * other], of.theta[index:]])
             for other in _reals_to_try(outputs, of)
         ]
     else:
         wider = replace(before, single=1)
-        at = before.poles
-        starts = [np.concatenate([of.theta[:at], [a], of.theta[at:]]) for a in _reals_to_try(outputs, of)]
+        index = before.poles
+        starts = [np.concatenate([of.theta[:index], [a], of.theta[index:]]) for a in _reals_to_try(outputs, of)]
     if outputs.enough_for(wider):
         for start in starts:
             yield solve(outputs, wider, start, rounds=1, evaluations=_EVALUATIONS_FIRST)
 
 
-def _reduced(outputs: Outputs, of: Separated, kind: Kind, *, fixed: bool = False) -> Separated:
+def _reduced(outputs: Outputs, of: SeparatedFit, kind: Kind, *, fixed: bool = False) -> SeparatedFit:
     """With the weights of noise and ε, and without the terms that do not lower the cost."""
     best = solve(outputs, of.structure, of.theta, rounds=_ROUNDS_LAST)
     while True:
@@ -147,8 +152,8 @@ def _reduced(outputs: Outputs, of: Separated, kind: Kind, *, fixed: bool = False
             for structure, start in reduced_structures(best, kind, fixed=fixed)
             if outputs.enough_for(structure)
         ]
-        rivals = [one for one in rivals if possible(outputs, one, kind)]
-        better = min(rivals, key=lambda one: one.cost, default=best)
+        rivals = [fitted for fitted in rivals if possible(outputs, fitted, kind)]
+        better = min(rivals, key=lambda fitted: fitted.cost, default=best)
         if better.cost >= best.cost and possible(outputs, best, kind):
             return best
         if better is best:
@@ -156,7 +161,7 @@ def _reduced(outputs: Outputs, of: Separated, kind: Kind, *, fixed: bool = False
         best = solve(outputs, better.structure, better.theta, rounds=_ROUNDS_LAST)
 
 
-def reduced_structures(of: Separated, kind: Kind, *, fixed: bool) -> Iterator[tuple[Structure, Floats]]:
+def reduced_structures(of: SeparatedFit, kind: Kind, *, fixed: bool) -> Iterator[tuple[Structure, Floats]]:
     """Structures with a term less, and a start for each; `fixed`: with as many poles."""
     structure, theta = of.structure, of.theta
     if structure.integrators and structure.poles + structure.integrators + structure.direct > 1:
@@ -171,11 +176,11 @@ def reduced_structures(of: Separated, kind: Kind, *, fixed: bool) -> Iterator[tu
         yield replace(structure, single=0), np.delete(theta, structure.poles - 1)
 
 
-def _pairs_to_try(outputs: Outputs, of: Separated) -> Floats:
+def _pairs_to_try(outputs: Outputs, of: SeparatedFit) -> Floats:
     """a1 and a0 of the pairs that would lower chi² most to first order, (starts, 2)."""
-    rest, _ = left_over(outputs, of)
+    residual, _ = left_over(outputs, of)
     f = outputs.grid.frequency_hz
-    power = np.sum(rest[:, : f.size] ** 2 + rest[:, f.size :] ** 2, axis=0)
+    power = np.sum(residual[:, : f.size] ** 2 + residual[:, f.size :] ** 2, axis=0)
     peaks = np.argsort(-power)[:_PEAKS]
     spacing = np.gradient(f)[peaks] if f.size > 1 else f[peaks]
     narrow = [(f[peaks], width * spacing / f[peaks]) for width in _WIDTHS]
@@ -187,19 +192,21 @@ def _pairs_to_try(outputs: Outputs, of: Separated) -> Floats:
     return _best(outputs, of, tried, lambda shapes: shapes.pairs(tried[:, 0], tried[:, 1]))
 
 
-def _reals_to_try(outputs: Outputs, of: Separated) -> Floats:
+def _reals_to_try(outputs: Outputs, of: SeparatedFit) -> Floats:
     """a of the real poles that would lower chi² most to first order, (starts,)."""
     f = outputs.grid.frequency_hz
     tried = 2 * np.pi * np.geomspace(f[0] / 10, f[-1] * 3, _SPREAD)
     return _best(outputs, of, tried, lambda shapes: shapes.real(tried)[:, np.newaxis])
 
 
-def _best(outputs: Outputs, of: Separated, tried: Floats, columns_of: Callable[[PartialFractions], Complex]) -> Floats:
-    """Those of `tried` whose columns (tried, columns, lines) explain most of the residuals, far enough apart."""
-    rest, bases = left_over(outputs, of)
+def _best(
+    outputs: Outputs, of: SeparatedFit, tried: Floats, columns_of: Callable[[PartialFractions], Complex]
+) -> Floats:
+    """Rows of `tried` whose columns (tried, columns, lines) explain most of the residuals, far enough apart."""
+    residual, bases = left_over(outputs, of)
     columns = columns_of(PartialFractions(of.structure, outputs.grid, outputs.unit))
     gain = np.zeros(len(tried))
-    for weight, right, basis in zip(of.weight, rest, bases):
+    for weight, right, basis in zip(of.weight, residual, bases):
         both = np.moveaxis(stacked(np.moveaxis(weight * columns, -1, 0)), 0, -1)
         both = both - (both @ basis) @ basis.T
         both /= np.linalg.norm(both, axis=-1, keepdims=True) + 1e-300

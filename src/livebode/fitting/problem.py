@@ -51,20 +51,20 @@ def described(model: PhysicalModel, held: dict[str, float]) -> FitModel | None:
     return FitModel(kind, 1 + position, False, 1.0, 1.0, 0.0, table)
 
 
-_STEP = 1e-7
+_STEP = 1e-7  # of a coordinate: near the root of the precision, where truncation and rounding are alike
 _ENOUGH = 1e-4  # of chi²: a step of 1 % of sigma, after which the remaining error is far smaller
-_AT_BOUND = 1e-6
+_AT_BOUND = 1e-6  # of a coordinate: a fit that ends this close was stopped by the bound
 
 
 @dataclass(frozen=True, eq=False)
-class Measured(RowArrays):
+class MeasuredRows(RowArrays):
     """Values (rows, lines), their standard deviations E|e|² = sigma² (NaN: not known), and which are used."""
 
     value: Complex
     sigma: Floats
     use: NDArray[np.bool_]
 
-    def repeated(self, times: int) -> Measured:
+    def repeated(self, times: int) -> MeasuredRows:
         return self[np.tile(np.arange(len(self)), times)]
 
 
@@ -152,15 +152,15 @@ class Problem:
     ) -> Problem:
         """This problem with another model, some parameters freed, and some held."""
         model = model or self.model
-        rest = {name: value for name, value in self.held.items() if name not in free} | dict(held or {})
-        return Problem(model, self.grid, rest, [name for name in model.names if name not in rest])
+        remaining = {name: value for name, value in self.held.items() if name not in free} | dict(held or {})
+        return Problem(model, self.grid, remaining, [name for name in model.names if name not in remaining])
 
     @property
     def identity(self) -> tuple[object, ...]:
         """Equal for problems with the same model, grid and free parameters."""
-        frequency_hz, *rest = self.grid
+        frequency_hz, *settings = self.grid
         held = tuple(sorted(self.held.items()))
-        return type(self.model), repr(self.model), held, frequency_hz.tobytes(), *rest
+        return type(self.model), repr(self.model), held, frequency_hz.tobytes(), *settings
 
     @property
     def size(self) -> int:
@@ -174,15 +174,15 @@ class Problem:
             values[..., self.model.names.index(name)] = value
         return values
 
-    def starts(self, measured: Measured, weight: Floats) -> Floats:
+    def starts(self, measured: MeasuredRows, weight: Floats) -> Floats:
         """The model's first values, (starts, rows, parameters), within the bounds."""
         value = np.where(measured.use, measured.value, 0.0)
-        found = self.model.starts(value, weight, self.grid)
+        starts = self.model.starts(value, weight, self.grid)
         low, high = (np.array([getattr(p, end) for p in self.model.parameters]) for end in ("low", "high"))
         middle = np.array([p.start for p in self.model.parameters])
-        return self.with_held(np.where(np.isfinite(found), found, middle).clip(low, high))
+        return self.with_held(np.where(np.isfinite(starts), starts, middle).clip(low, high))
 
-    def solve(self, measured: Measured, weight: Floats, start: Floats, rounds: int = 30) -> tuple[Solution, Floats]:
+    def solve(self, measured: MeasuredRows, weight: Floats, start: Floats, rounds: int = 30) -> tuple[Solution, Floats]:
         """Least squares from `start` (rows, parameters), with the weights (rows, lines); and the cost (rows,)."""
         value = np.where(measured.use, measured.value, 0.0)
         weight = np.where(measured.use, weight, 0.0)
@@ -201,14 +201,14 @@ class Problem:
 
         with np.errstate(all="ignore"):
             low, high = self._bounds(scale)
-            found: Minimum = minimise(
+            minimum: Minimum = minimise(
                 normal, self._inward(start, scale), rounds, 1e-10, enough=_ENOUGH, low=low, high=high
             )
-        values = self._outward(found.parameters, start, scale)
-        response, slope = found.known
+        values = self._outward(minimum.parameters, start, scale)
+        response, slope = minimum.known
         if self._unsized.any():
             slope = slope * (self._scale / scale)[:, np.newaxis]
-        return Solution(values, response, slope, found.settled), found.cost
+        return Solution(values, response, slope, minimum.settled), minimum.cost
 
     def at_bound(self, values: Floats) -> NDArray[np.bool_]:
         """Rows with a free parameter at one of its bounds, except at a zero that it cannot pass."""

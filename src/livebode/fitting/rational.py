@@ -11,17 +11,16 @@ from numpy.typing import ArrayLike, NDArray
 from livebode.arrays import Complex, Floats
 from livebode.core import OK, FitError, Parameters, Response, Responses, UsageError, not_installed
 from livebode.fitting.fitter import measured_of
-from livebode.fitting.hold import to_continuous
-from livebode.fitting.problem import Measured
+from livebode.fitting.problem import MeasuredRows
 from livebode.fitting.rows import NO_RESPONSE, NOT_SEEN
-from livebode.fitting.transfer import Transfer
+from livebode.fitting.transfer import Transfer, to_continuous
 from livebode.fitting.weights import chi_squared, own_epsilon, squares, weights
 
 Method = Literal["levy", "sanathanan-koerner", "maximum likelihood"]
 
 _ROUNDS = 20
 _SETTLED = 1e-9
-_ORDER_MAX = 20
+_ORDER_MAX = 20  # higher powers of z are too nearly dependent in double precision
 
 
 class _Equations(NamedTuple):
@@ -29,7 +28,7 @@ class _Equations(NamedTuple):
 
     powers: Complex
     above: int
-    measured: Measured
+    measured: MeasuredRows
 
 
 def fit_rational(
@@ -97,8 +96,8 @@ def fit_rational(
             lines=len(lines),
             parameters=q + m + 1,
         )
-    found, _ = measured_of(responses, np.ones(len(lines), dtype=bool))
-    equations = _Equations(lines.z[:, np.newaxis] ** np.arange(q + 1), m + 1, found)
+    rows, _ = measured_of(responses, np.ones(len(lines), dtype=bool))
+    equations = _Equations(lines.z[:, np.newaxis] ** np.arange(q + 1), m + 1, rows)
     names = tuple([f"b{i}" for i in range(m + 1)] + [f"a{i}" for i in range(q)])
     return _fitted(equations, method, names, responses)
 
@@ -112,12 +111,12 @@ def _fitted(equations: _Equations, method: Method, names: tuple[str, ...], respo
     chi2, epsilon = np.full(len(dof), np.nan), np.full(len(dof), np.nan)
     if ok.any():
         some = equations._replace(measured=measured[ok])
-        found, weight = _solved(some, method)
-        value = _ratio(some, found)
+        solution, weight = _solved(some, method)
+        value = _ratio(some, solution)
         eps = own_epsilon(some.measured, value, dof[ok])
-        theta[ok], covariance[ok] = found, _covariance(some, found, weight, eps, method)
-        rest, noise, _ = squares(some.measured, value)
-        chi2[ok], epsilon[ok] = chi_squared(rest, noise), eps
+        theta[ok], covariance[ok] = solution, _covariance(some, solution, weight, eps, method)
+        residual, noise, _ = squares(some.measured, value)
+        chi2[ok], epsilon[ok] = chi_squared(residual, noise), eps
     status = np.where(ok, OK, NO_RESPONSE).astype("<U20")
     status[ok & ~(np.isfinite(theta).all(axis=1) & np.isfinite(covariance).all(axis=(1, 2)))] = NOT_SEEN
     failed = status != OK
@@ -172,8 +171,8 @@ def _most_likely(equations: _Equations, theta: Floats) -> tuple[Floats, Floats]:
 
 def _cost(equations: _Equations, theta: Floats, weight: Floats) -> Floats:
     measured = equations.measured
-    rest = np.where(measured.use, measured.value - _ratio(equations, theta), 0.0)
-    return np.asarray(np.sum(np.abs(weight * rest) ** 2, axis=1))
+    residual = np.where(measured.use, measured.value - _ratio(equations, theta), 0.0)
+    return np.asarray(np.sum(np.abs(weight * residual) ** 2, axis=1))
 
 
 def _covariance(equations: _Equations, theta: Floats, weight: Floats, eps: Floats, method: Method) -> Floats:
@@ -200,12 +199,12 @@ def _covariance(equations: _Equations, theta: Floats, weight: Floats, eps: Float
     return np.asarray(through @ through.swapaxes(1, 2))
 
 
-def _noise_weights(measured: Measured, size: Floats, eps: Floats) -> Floats:
+def _noise_weights(measured: MeasuredRows, size: Floats, eps: Floats) -> Floats:
     """Weights as those of `weights`; by size where no noise is known."""
-    found = weights(measured.sigma, size, eps)
-    unknown = ~((found > 0) & measured.use).any(axis=1)
-    found[unknown] = weights(measured.sigma[unknown], size[unknown], np.ones(np.count_nonzero(unknown)))
-    return np.where(measured.use, found, 0.0)
+    by_noise = weights(measured.sigma, size, eps)
+    unknown = ~((by_noise > 0) & measured.use).any(axis=1)
+    by_noise[unknown] = weights(measured.sigma[unknown], size[unknown], np.ones(np.count_nonzero(unknown)))
+    return np.where(measured.use, by_noise, 0.0)
 
 
 def _linear(equations: _Equations, weight: Floats) -> tuple[Complex, Complex]:
@@ -223,9 +222,9 @@ def _least_squares(left: Complex, right: NDArray[Any]) -> Floats:
     q, r = np.linalg.qr(stacked)
     turned = q.swapaxes(1, 2) @ np.concatenate([right.real, right.imag], axis=1)[..., np.newaxis]
     regular = np.abs(np.einsum("rii->ri", r)).min(axis=1) > 0
-    found = np.full(turned.shape[:2], np.nan)
-    found[regular] = np.linalg.solve(r[regular], turned[regular])[..., 0]
-    return found
+    solution = np.full(turned.shape[:2], np.nan)
+    solution[regular] = np.linalg.solve(r[regular], turned[regular])[..., 0]
+    return solution
 
 
 def _below(equations: _Equations, theta: Floats) -> Complex:

@@ -9,39 +9,39 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Floats
 from livebode.core import OK
-from livebode.fitting.problem import Measured, Problem, Solution
+from livebode.fitting.problem import MeasuredRows, Problem, Solution
 from livebode.fitting.weights import chi_squared, lacks_more_than, own_epsilon, squares, weights
 from livebode.kernel import FitModel, FitRows, fit
 from livebode.language import Message
 
-_FROM = 0.03
+_FROM = 0.03  # of |G|: a smaller misfit remains the model's ε
 _EXPLAINED = 0.5
 _ROUNDS = 15
 
 
-def held_by_friction(problem: Problem, measured: Measured, without: Solution, dof: Floats) -> NDArray[np.bool_]:
+def held_by_friction(problem: Problem, measured: MeasuredRows, without: Solution, dof: Floats) -> NDArray[np.bool_]:
     """Rows whose ε falls to less than half as soon as one viscous friction of the model is fitted too.
 
     Dry friction of an axis at standstill acts on such a small motion much like a viscous one, and a real viscous one
     biases stiffness and inertia alike. Only rows with a model error above 3 % of |G| are examined; the error of a wrong
     model is not explained by friction.
     """
-    found = np.zeros(len(dof), dtype=bool)
+    by_friction = np.zeros(len(dof), dtype=bool)
     frictions = [name for name in problem.model.frictions if name in problem.held]
     lacking = np.flatnonzero(lacks_more_than(_FROM, measured, without.response, dof))
     if not (lacking.size and frictions):
-        return found
+        return by_friction
     some = measured[lacking]
     eps = own_epsilon(some, without.response[lacking], dof[lacking])
     for name in frictions:
         wider = problem.variant(free=(name,))
-        at = wider.model.names.index(name)
+        column = wider.model.names.index(name)
         start = without.values[lacking]
-        start[:, at] = wider.model.shown(start, problem.grid)[:, at]
+        start[:, column] = wider.model.shown(start, problem.grid)[:, column]
         weight = weights(some.sigma, np.abs(some.value), eps / 2)
         solution, _ = wider.solve(some, weight, start, _ROUNDS)
-        found[lacking] |= own_epsilon(some, solution.response, dof[lacking] - 1) < _EXPLAINED * eps
-    return found
+        by_friction[lacking] |= own_epsilon(some, solution.response, dof[lacking] - 1) < _EXPLAINED * eps
+    return by_friction
 
 
 NO_RESPONSE = Message("no response")
@@ -81,12 +81,12 @@ _WORD = "<U20"
 _FIRST_EPSILON = (
     0.1  # so that a line measured much more accurately than the model is valid does not dominate a first fit
 )
-_REWEIGHTED, _SAME = 8, 0.01
+_REWEIGHTED, _SAME = 8, 0.01  # rounds, and the change of ε by which no weight changes visibly
 _SUSPICIOUS = 4.0  # of a reduced chi², ε and all
 _WARM_ROUNDS = 12
-_DOF_LEAST = 3.0
+_DOF_LEAST = 3.0  # the correction d/(d − 2) of weights from estimated noise is infinite at two
 _CONDITION_MAX = 1e11
-_ROUNDING = 1e-14
+_ROUNDING = 1e-14  # keeps a singular matrix invertible; its inverse then exceeds the limit above
 
 
 class FittedRows(NamedTuple):
@@ -105,7 +105,7 @@ class FittedRows(NamedTuple):
 
 def fit_rows(
     problem: Problem,
-    measured: Measured,
+    measured: MeasuredRows,
     noise_dof: Floats,
     start: Floats | None = None,
     epsilon: Floats | None = None,
@@ -124,8 +124,8 @@ def fit_rows(
     whole = _none(problem, measured, dof, NO_RESPONSE)
     if some.size:
         begin, eps = (None if x is None else x[some] for x in (start, epsilon))
-        found = _fitted_apart(problem, measured[some], noise_dof[some], begin, eps, dof[some])
-        for kept, other in zip(whole, found):
+        fitted = _fitted_apart(problem, measured[some], noise_dof[some], begin, eps, dof[some])
+        for kept, other in zip(whole, fitted):
             kept[some] = other
     return whole
 
@@ -133,7 +133,7 @@ def fit_rows(
 def _fitted_natively(
     problem: Problem,
     native: FitModel,
-    measured: Measured,
+    measured: MeasuredRows,
     noise_dof: Floats,
     start: Floats | None,
     epsilon: Floats | None,
@@ -141,15 +141,20 @@ def _fitted_natively(
     """All rows in C."""
     grid = problem.grid
     rows = FitRows(measured.value, measured.sigma, measured.use, noise_dof, start, epsilon)
-    found = fit(native, grid.frequency_hz, grid.rate_hz, rows)
-    status = _WORDS[found.status]
+    result = fit(native, grid.frequency_hz, grid.rate_hz, rows)
+    status = _WORDS[result.status]
     return FittedRows(
-        found.values, found.covariance, status, found.epsilon, found.chi2, found.dof, found.response, found.ended
+        result.values, result.covariance, status, result.epsilon, result.chi2, result.dof, result.response, result.ended
     )
 
 
 def _fitted_apart(
-    problem: Problem, measured: Measured, noise_dof: Floats, start: Floats | None, epsilon: Floats | None, dof: Floats
+    problem: Problem,
+    measured: MeasuredRows,
+    noise_dof: Floats,
+    start: Floats | None,
+    epsilon: Floats | None,
+    dof: Floats,
 ) -> FittedRows:
     """All rows at once; if that is not possible, each by itself: one row without a solution disturbs no other."""
     try:
@@ -165,7 +170,7 @@ def _fitted_apart(
     return FittedRows(*(np.concatenate(columns) for columns in zip(*parts)))
 
 
-def _none(problem: Problem, measured: Measured, dof: Floats, word: str) -> FittedRows:
+def _none(problem: Problem, measured: MeasuredRows, dof: Floats, word: str) -> FittedRows:
     """Rows without a fit, with this status."""
     rows, n = len(dof), len(problem.model.names)
     nan = np.full(rows, np.nan)
@@ -176,49 +181,54 @@ def _none(problem: Problem, measured: Measured, dof: Floats, word: str) -> Fitte
 
 
 def _fitted(
-    problem: Problem, measured: Measured, noise_dof: Floats, start: Floats | None, epsilon: Floats | None, dof: Floats
+    problem: Problem,
+    measured: MeasuredRows,
+    noise_dof: Floats,
+    start: Floats | None,
+    epsilon: Floats | None,
+    dof: Floats,
 ) -> FittedRows:
     eps = np.full(len(dof), _FIRST_EPSILON) if epsilon is None else epsilon
     # Before a model is known the measured size replaces the model's.
     size = np.where(measured.use, np.abs(measured.value), 0.0)
     weight = _weights(measured, size, eps)
-    found = _begun(problem, measured, weight, start, dof)
+    solution = _begun(problem, measured, weight, start, dof)
     if epsilon is None:
-        found, eps = _reweighted(problem, measured, found, dof)
+        solution, eps = _reweighted(problem, measured, solution, dof)
     else:
         # A row with a much larger model error than the previous ones is less certain than they were.
-        more = own_epsilon(measured, found.response, _SUSPICIOUS * dof) > eps
+        more = own_epsilon(measured, solution.response, _SUSPICIOUS * dof) > eps
         if more.any():
-            eps = np.where(more, own_epsilon(measured, found.response, dof), eps)
-    return _judged(problem, measured, noise_dof, found, eps, dof)
+            eps = np.where(more, own_epsilon(measured, solution.response, dof), eps)
+    return _judged(problem, measured, noise_dof, solution, eps, dof)
 
 
-def _weights(measured: Measured, size: Floats, epsilon: Floats) -> Floats:
+def _weights(measured: MeasuredRows, size: Floats, epsilon: Floats) -> Floats:
     """Where neither noise nor ε is known, the weight of a line is its size."""
-    found = weights(measured.sigma, size, epsilon)
-    unknown = ~(np.where(measured.use, found, 0.0) > 0).any(axis=1)
+    by_noise = weights(measured.sigma, size, epsilon)
+    unknown = ~(np.where(measured.use, by_noise, 0.0) > 0).any(axis=1)
     if unknown.any():
-        found[unknown] = weights(measured.sigma[unknown], size[unknown], np.ones(np.count_nonzero(unknown)))
-    return found
+        by_noise[unknown] = weights(measured.sigma[unknown], size[unknown], np.ones(np.count_nonzero(unknown)))
+    return by_noise
 
 
-def _begun(problem: Problem, measured: Measured, weight: Floats, start: Floats | None, dof: Floats) -> Solution:
+def _begun(problem: Problem, measured: MeasuredRows, weight: Floats, start: Floats | None, dof: Floats) -> Solution:
     """From the start, and for rows where this fails the best fit of a scan."""
     if start is None:
         return _scanned(problem, measured, weight)
-    found, cost = problem.solve(measured, weight, start, _WARM_ROUNDS)
-    lost = ~found.settled | (cost > _SUSPICIOUS * dof)
+    solution, cost = problem.solve(measured, weight, start, _WARM_ROUNDS)
+    lost = ~solution.settled | (cost > _SUSPICIOUS * dof)
     if lost.any():
         again = _scanned(problem, measured[lost], weight[lost])
-        rest = np.abs(weight[lost] * np.where(measured.use[lost], again.response - measured.value[lost], 0.0)) ** 2
-        better = (rest.sum(axis=1) < cost[lost]) | ~found.settled[lost]
+        squared = np.abs(weight[lost] * np.where(measured.use[lost], again.response - measured.value[lost], 0.0)) ** 2
+        better = (squared.sum(axis=1) < cost[lost]) | ~solution.settled[lost]
         rows = np.flatnonzero(lost)[better]
-        for kept, other in zip(found, again):
+        for kept, other in zip(solution, again):
             kept[rows] = other[better]
-    return found
+    return solution
 
 
-def _scanned(problem: Problem, measured: Measured, weight: Floats) -> Solution:
+def _scanned(problem: Problem, measured: MeasuredRows, weight: Floats) -> Solution:
     """The best of the fits from the model's first values."""
     starts = problem.starts(measured, np.where(measured.use, weight, 0.0))
     count, rows, _ = starts.shape
@@ -227,62 +237,62 @@ def _scanned(problem: Problem, measured: Measured, weight: Floats) -> Solution:
     return Solution(*(x.reshape(count, rows, *x.shape[1:])[best, np.arange(rows)] for x in every))
 
 
-def _reweighted(problem: Problem, measured: Measured, found: Solution, dof: Floats) -> tuple[Solution, Floats]:
+def _reweighted(problem: Problem, measured: MeasuredRows, solution: Solution, dof: Floats) -> tuple[Solution, Floats]:
     """Fits repeated with the ε of their residuals until it converges; each row by itself."""
     eps = np.full(len(dof), _FIRST_EPSILON)
     for _ in range(_REWEIGHTED):
-        new = own_epsilon(measured, found.response, dof)
+        new = own_epsilon(measured, solution.response, dof)
         same = np.abs(new - eps) <= _SAME * new
         if same.all():
             break
         eps = np.where(same, eps, new)
-        weight = _weights(measured, np.abs(found.response), eps)
-        again, _ = problem.solve(measured, weight, found.values)
-        for kept, other in zip(found, again):
+        weight = _weights(measured, np.abs(solution.response), eps)
+        again, _ = problem.solve(measured, weight, solution.values)
+        for kept, other in zip(solution, again):
             kept[~same] = other[~same]
-    return found, eps
+    return solution, eps
 
 
 def _judged(
-    problem: Problem, measured: Measured, noise_dof: Floats, found: Solution, eps: Floats, dof: Floats
+    problem: Problem, measured: MeasuredRows, noise_dof: Floats, solution: Solution, eps: Floats, dof: Floats
 ) -> FittedRows:
-    rest, noise, _ = squares(measured, found.response)
-    small = covariance(measured, found, eps, noise_dof)
+    residual, noise, _ = squares(measured, solution.response)
+    small = covariance(measured, solution, eps, noise_dof)
     with np.errstate(invalid="ignore"):
         uncertain = np.sqrt(np.einsum("rii->ri", small))[:, problem.relative()]
         unseen = ~np.isfinite(small).all(axis=(1, 2)) | ~(uncertain <= _UNCERTAIN).all(axis=1)
     status = np.full(len(dof), OK, dtype=_WORD)
     for word, failed in (
-        (FRICTION, held_by_friction(problem, measured, found, dof)),
-        (NO_FIT, lacks_more_than(EPSILON_MAX, measured, found.response, dof)),
+        (FRICTION, held_by_friction(problem, measured, solution, dof)),
+        (NO_FIT, lacks_more_than(EPSILON_MAX, measured, solution.response, dof)),
         (NOT_SEEN, unseen),
-        (BOUND, problem.at_bound(found.values)),
-        (NOT_CONVERGED, ~found.settled),
+        (BOUND, problem.at_bound(solution.values)),
+        (NOT_CONVERGED, ~solution.settled),
     ):
         status[failed] = word
     failed = status != OK
-    outward = problem.outward_slopes(found.values)
-    whole = np.zeros((len(dof), found.values.shape[1], found.values.shape[1]))
+    outward = problem.outward_slopes(solution.values)
+    whole = np.zeros((len(dof), solution.values.shape[1], solution.values.shape[1]))
     free = np.flatnonzero(problem.free)
     whole[:, free[:, np.newaxis], free] = outward[:, :, np.newaxis] * small * outward[:, np.newaxis]
     whole[failed] = np.nan
     return FittedRows(
-        np.where(failed[:, np.newaxis], np.nan, found.values),
-        whole, status, np.where(failed, np.nan, eps), chi_squared(rest, noise), dof,
-        found.response, found.values,
+        np.where(failed[:, np.newaxis], np.nan, solution.values),
+        whole, status, np.where(failed, np.nan, eps), chi_squared(residual, noise), dof,
+        solution.response, solution.values,
     )  # fmt: skip
 
 
-def covariance(measured: Measured, found: Solution, eps: Floats, noise_dof: Floats) -> Floats:
+def covariance(measured: MeasuredRows, solution: Solution, eps: Floats, noise_dof: Floats) -> Floats:
     """Covariance of the free parameters' coordinates, (rows, free, free); not finite where it is singular.
 
     A sigma that was estimated with d degrees of freedom makes a weight that scatters; weighted least squares then
     scatter more than the weights indicate, by d/(d − 2) where the weight is noise alone and parameters are few; with as
     many parameters as data the weights have no effect.
     """
-    size = np.abs(found.response)
+    size = np.abs(solution.response)
     weight = np.where(measured.use, _weights(measured, size, eps), 0.0)
-    left = weight[..., np.newaxis] * found.slope
+    left = weight[..., np.newaxis] * solution.slope
     matrix = (left.conj().swapaxes(1, 2) @ left).real
     share = np.where(measured.sigma > 0, measured.sigma * weight, 0.0) ** 2 / 2
     d = np.where(np.isnan(noise_dof), np.inf, np.maximum(noise_dof, _DOF_LEAST))[:, np.newaxis]

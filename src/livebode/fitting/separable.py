@@ -12,7 +12,7 @@ from livebode.arrays import Complex, Floats
 from livebode.core import needing
 from livebode.fitting.partial_fractions import PartialFractions, Structure
 from livebode.fitting.physical import EvaluationGrid
-from livebode.fitting.problem import Measured, Solution
+from livebode.fitting.problem import MeasuredRows, Solution
 from livebode.fitting.rows import covariance
 from livebode.fitting.weights import epsilon_for, misfit_by, squares, weights
 
@@ -29,7 +29,7 @@ _EVALUATIONS = 40
 class Outputs:
     """Responses of several outputs to one input, (outputs, lines), and the degrees of freedom of their sigmas."""
 
-    measured: Measured
+    measured: MeasuredRows
     noise_dof: Floats
     grid: EvaluationGrid
 
@@ -49,7 +49,7 @@ class Outputs:
 
 
 @dataclass(frozen=True, eq=False)
-class Separated:
+class SeparatedFit:
     """A structure fitted: the nonlinear parameters, the weights of the columns, and what they give.
 
     Attributes
@@ -79,7 +79,7 @@ class Separated:
 
 def solve(
     outputs: Outputs, structure: Structure, start: Floats, *, rounds: int, evaluations: int = _EVALUATIONS
-) -> Separated:
+) -> SeparatedFit:
     """Fit from a start, and again with the ε of the residuals, at most `rounds` times."""
     measured = outputs.measured
     epsilon = np.full(structure.outputs, _FIRST_EPSILON)
@@ -88,18 +88,18 @@ def solve(
         problem = _WeightedFit(outputs, structure, _weights(measured, epsilon))
         theta, settled = problem.minimised(theta, evaluations)
         linear, response = problem.at(theta)
-        rest, noise, _ = squares(measured, response)
+        residual, noise, _ = squares(measured, response)
         size = np.where(measured.use, np.abs(measured.value), 0.0) ** 2
-        before, epsilon = epsilon, epsilon_for(rest, noise, size, dof)
+        before, epsilon = epsilon, epsilon_for(residual, noise, size, dof)
         if (np.abs(epsilon - before) <= _SAME * epsilon).all():
             break
     variance = noise + epsilon[:, np.newaxis] ** 2 * size
-    likely = float(np.sum(misfit_by(rest, noise, variance, outputs.noise_dof, measured.use)))
+    likely = float(np.sum(misfit_by(residual, noise, variance, outputs.noise_dof, measured.use)))
     # Errors of an incomplete model are alike at neighbouring lines and in all outputs: they are fewer than lines.
     erring = 2 * float(np.sum(1 - (noise / np.where(variance > 0, variance, 1.0))[measured.use]))
     each_pole = pole_price(outputs.grid.frequency_hz.size, erring)
     cost = likely + structure.size * np.log(outputs.count) + structure.poles * each_pole
-    return Separated(structure, theta, linear, response, problem.weight, epsilon, cost, settled)
+    return SeparatedFit(structure, theta, linear, response, problem.weight, epsilon, cost, settled)
 
 
 def pole_price(lines: int, erring: float) -> float:
@@ -108,7 +108,7 @@ def pole_price(lines: int, erring: float) -> float:
     return float(np.log(lines) + _ERROR_PRICE * erring)
 
 
-def whole_covariance(outputs: Outputs, of: Separated) -> Floats:
+def whole_covariance(outputs: Outputs, of: SeparatedFit) -> Floats:
     """Covariance of the nonlinear parameters and then the weights of each output; not finite where it is singular.
 
     The noise of different outputs is taken as independent.
@@ -120,18 +120,18 @@ def whole_covariance(outputs: Outputs, of: Separated) -> Floats:
     epsilon = np.where(_unknown(measured) & (of.epsilon == 0), 1.0, of.epsilon)
     total = np.sqrt(sigma**2 + (epsilon[:, np.newaxis] * np.abs(measured.value)) ** 2)
     # As noise alone: what part of it is sigma, with few degrees of freedom, is in `noise_dof` of the whole.
-    flat = Measured(measured.value.reshape(1, -1), total.reshape(1, -1), measured.use.reshape(1, -1))
-    found = Solution(of.theta[np.newaxis], of.response.reshape(1, -1), slope[np.newaxis], np.ones(1, dtype=bool))
+    flat = MeasuredRows(measured.value.reshape(1, -1), total.reshape(1, -1), measured.use.reshape(1, -1))
+    solution = Solution(of.theta[np.newaxis], of.response.reshape(1, -1), slope[np.newaxis], np.ones(1, dtype=bool))
     share = np.where(measured.use, sigma / np.where(total > 0, total, 1.0), 0.0) ** 2
     dof = outputs.noise_dof / np.maximum(np.mean(share, axis=1, where=measured.use) ** 2, 1e-12)
-    return np.asarray(covariance(flat, found, np.zeros(1), np.array([np.min(dof)]))[0])
+    return np.asarray(covariance(flat, solution, np.zeros(1), np.array([np.min(dof)]))[0])
 
 
-def left_over(outputs: Outputs, of: Separated) -> tuple[Floats, list[Floats]]:
+def left_over(outputs: Outputs, of: SeparatedFit) -> tuple[Floats, list[Floats]]:
     """Weighted residuals, real above imaginary parts, (outputs, 2·lines), and the basis of each output's columns."""
     problem = _WeightedFit(outputs, of.structure, of.weight)
-    rest = of.weight * np.where(outputs.measured.use, outputs.measured.value - of.response, 0.0)
-    return stacked(rest.T).T, [q for q, *_ in problem.factors(of.theta)]
+    residual = of.weight * np.where(outputs.measured.use, outputs.measured.value - of.response, 0.0)
+    return stacked(residual.T).T, [q for q, *_ in problem.factors(of.theta)]
 
 
 def stacked(values: NDArray[Any]) -> Floats:
@@ -157,22 +157,22 @@ class _WeightedFit:
         if not start.size:
             return start, True
         with np.errstate(all="ignore"):
-            found = least_squares(
+            minimum = least_squares(
                 self._residual, start, self._jacobian, method="lm", x_scale="jac", max_nfev=evaluations,
                 xtol=_TOLERANCE, ftol=_TOLERANCE, gtol=_TOLERANCE,
             )  # fmt: skip
-        return np.asarray(found.x), bool(found.success)
+        return np.asarray(minimum.x), bool(minimum.success)
 
     def at(self, theta: Floats) -> tuple[Floats, Complex]:
         """Weights (outputs, linear) and response (outputs, lines)."""
-        found = self.factors(theta)
-        return np.array([c for _, c, _, _ in found]), np.array([columns @ c for _, c, columns, _ in found])
+        factors = self.factors(theta)
+        return np.array([c for _, c, _, _ in factors]), np.array([columns @ c for _, c, columns, _ in factors])
 
     def factors(self, theta: Floats) -> list[Any]:
         """Orthonormal basis of the weighted columns, their weights, the columns, and the residual, of each output."""
         if self._last is not None and np.array_equal(self._last[0], theta):
             return self._last[1]
-        found = []
+        factors = []
         delays, columns = self.structure.delays_of(theta), None
         for weight, right, delay_s in zip(self.weight, self._right, delays):
             if columns is None or self.structure.delays:
@@ -182,9 +182,9 @@ class _WeightedFit:
             q, r = np.linalg.qr(left / scale)
             across = q.T @ right
             linear = np.linalg.lstsq(r, across, rcond=1e-13)[0] / scale
-            found.append((q, linear, columns, right - q @ across))
-        self._last = (np.array(theta), found)
-        return found
+            factors.append((q, linear, columns, right - q @ across))
+        self._last = (np.array(theta), factors)
+        return factors
 
     def slopes(self, theta: Floats, linear: Floats) -> Complex:
         """Derivatives of all responses by all parameters, (outputs·lines, size), without weights."""
@@ -197,7 +197,7 @@ class _WeightedFit:
         return whole.reshape(of.outputs * lines, of.size)
 
     def _residual(self, theta: Floats) -> Floats:
-        return np.concatenate([rest for *_, rest in self.factors(theta)])
+        return np.concatenate([residual for *_, residual in self.factors(theta)])
 
     def _jacobian(self, theta: Floats) -> Floats:
         """Kaufman's: the slopes at fixed weights, without what the weights can follow."""
@@ -212,21 +212,21 @@ class _WeightedFit:
         of, delay_s = self.structure, float(self.structure.delays_of(theta)[k])
         if of.delays or self._moves is None or not np.array_equal(self._moves[0], theta):
             self._moves = (np.array(theta), self._shapes.moves(theta, delay_s))
-        found = self._shapes.slopes(self._moves[1], linear)
+        slopes = self._shapes.slopes(self._moves[1], linear)
         if not of.delays:
-            return found
+            return slopes
         step = _TICK_STEP / self._rate_hz
         later, earlier = (self._shapes.columns(theta, delay_s + way * step) @ linear for way in (1, -1))
-        by_delay = np.zeros((len(found), of.outputs), dtype=np.complex128)
+        by_delay = np.zeros((len(slopes), of.outputs), dtype=np.complex128)
         by_delay[:, k] = (later - earlier) / (2 * step)
-        return np.concatenate([found, by_delay], axis=1)
+        return np.concatenate([slopes, by_delay], axis=1)
 
 
-def _unknown(measured: Measured) -> Any:
+def _unknown(measured: MeasuredRows) -> Any:
     return ~((measured.sigma > 0) & measured.use).any(axis=1)
 
 
-def _weights(measured: Measured, epsilon: Floats) -> Floats:
+def _weights(measured: MeasuredRows, epsilon: Floats) -> Floats:
     """Weight of each line; by its size where neither noise nor ε is known.
 
     The size is the measured one: that of a model with too few poles is wrong by orders of magnitude between them.

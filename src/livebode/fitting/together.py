@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from livebode.core import Emit, Parameters, Responses, ignore
-from livebode.fitting.fitter import Fitter
+from livebode.fitting.fitter import FitTask, Fitter, fitted_together
 from livebode.fitting.rows import FittedRows
-from livebode.fitting.tasks import FitTask, fitted_together
 
 
 def fit_each(
@@ -43,9 +42,9 @@ def fit_each(
                 tasks[i] = fitters[i].task(batches[i][done[i] :])
             except Exception as error:
                 errors[i] = error
-        for i, found in _fitted(tasks, errors).items():
+        for i, rows in _fitted(tasks, errors).items():
             try:
-                parts[i].append(fitters[i].finish(tasks[i], found, emits[i]))
+                parts[i].append(fitters[i].finish(tasks[i], rows, emits[i]))
             except Exception as error:
                 errors[i] = error
             done[i] += len(tasks[i].responses)
@@ -59,10 +58,10 @@ def _fitted(tasks: dict[int, FitTask], errors: dict[int, Exception]) -> dict[int
     try:
         return dict(zip(tasks, fitted_together(list(tasks.values()))))
     except Exception:
-        found = {}
+        rows = {}
         for i, task in tasks.items():
             try:
-                found[i] = task.fitted()
+                rows[i] = task.fitted()
             except Exception as error:
                 errors[i] = error
-        return found
+        return rows

@@ -1,4 +1,4 @@
-"""Transfer functions in s for many parameters at once: poles, zeros, and sampling behind a hold."""
+"""Transfer functions in s for many parameters at once: poles, zeros, sampling behind a hold, and back from z."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from livebode.arrays import Complex, Floats
 from livebode.core import FitError
 
 _APART = 1e-5  # poles nearer to each other than this share of their size are moved apart
-_TINY = 1e-300
+_TINY = 1e-300  # avoids 0/0, and vanishes beside any other number
 
 
 class Transfer(NamedTuple):
@@ -71,7 +71,7 @@ class Transfer(NamedTuple):
         ticks = np.asarray(delay_s, dtype=np.float64) * rate_hz
         whole = np.floor(ticks)
         late = (ticks - whole)[..., np.newaxis, np.newaxis] if np.any(ticks) else None
-        found: Any = 0.0
+        response: Any = 0.0
         if self.denominator.shape[-1] > 1:
             poles = self.poles()
             poles[poles == 0] = _TINY**0.1  # a pole that friction hardly moves: equivalent to an integrator
@@ -84,21 +84,21 @@ class Transfer(NamedTuple):
             else:
                 soon = np.expm1(poles * (1 - late))
                 sampled *= soon + (end - soon) / z[..., np.newaxis, :]
-            found = (weights @ sampled)[..., 0, :]
+            response = (weights @ sampled)[..., 0, :]
         for order, weight in enumerate(self._at_rest(), 1):
-            found = found + weight[..., np.newaxis] * _integrated(order, z, tick, late)
+            response = response + weight[..., np.newaxis] * _integrated(order, z, tick, late)
         if np.any(whole):
-            found = found * z ** -whole[..., np.newaxis]
-        return np.asarray(found)
+            response = response * z ** -whole[..., np.newaxis]
+        return np.asarray(response)
 
     def poles(self) -> Complex:
         """Poles without the integrators, shape (..., poles); equal ones are moved apart by a hundred-thousandth."""
-        found = roots(self.denominator)
-        if found.shape[-1] == 2:
-            near = np.abs(found[..., 0] - found[..., 1]) < _APART * np.abs(found[..., 0])
+        poles = roots(self.denominator)
+        if poles.shape[-1] == 2:
+            near = np.abs(poles[..., 0] - poles[..., 1]) < _APART * np.abs(poles[..., 0])
             if near.any():
-                found[near] = found[near].mean(axis=-1, keepdims=True) * np.array([1 - _APART, 1 + _APART])
-        return found
+                poles[near] = poles[near].mean(axis=-1, keepdims=True) * np.array([1 - _APART, 1 + _APART])
+        return poles
 
     def zeros(self) -> Complex:
         """Shape (..., zeros)."""
@@ -144,21 +144,21 @@ def roots(polynomial: Floats) -> Complex:
     companion = np.zeros((*monic.shape[:-1], degree, degree))
     companion[..., 0, :] = -monic / scale**power
     companion[..., np.arange(1, degree), np.arange(degree - 1)] = 1.0
-    found = np.linalg.eigvals(np.where(np.isfinite(companion), companion, 0.0)) * scale
-    return _by_size(found)
+    poles = np.linalg.eigvals(np.where(np.isfinite(companion), companion, 0.0)) * scale
+    return _by_size(poles)
 
 
-def _by_size(found: Complex) -> Complex:
-    size = np.round(np.abs(found) / np.max(np.abs(found) + _TINY, axis=-1, keepdims=True), 9)
-    order = np.lexsort((found.imag, size))
-    return np.take_along_axis(found, order, axis=-1)
+def _by_size(values: Complex) -> Complex:
+    size = np.round(np.abs(values) / np.max(np.abs(values) + _TINY, axis=-1, keepdims=True), 9)
+    order = np.lexsort((values.imag, size))
+    return np.take_along_axis(values, order, axis=-1)
 
 
-def _valued(polynomial: Floats, at: Complex) -> Complex:
+def _valued(polynomial: Floats, places: Complex) -> Complex:
     """Values of polynomials (..., 1, degree + 1) at places (..., places), by Horner."""
     value: Any = polynomial[..., 0]
     for i in range(1, polynomial.shape[-1]):
-        value = value * at + polynomial[..., i]
+        value = value * places + polynomial[..., i]
     return np.asarray(value)
 
 
@@ -175,3 +175,123 @@ def _integrated(order: int, z: Complex, tick: float, late: Floats | None) -> Com
 
 def _stacked(coefficients: list[Floats]) -> Floats:
     return np.stack(np.broadcast_arrays(*coefficients), axis=-1)
+
+
+_AT_ONE = 1e-6  # a pole this near to z = 1 is an integrator
+_AROUND = 1.5  # of the distance of the poles from 1: a circle around all of them
+_NEAR = 1e-6
+
+
+def to_discrete(transfer: Transfer, rate_hz: float, delay_s: float = 0.0) -> tuple[Floats, Floats]:
+    """Coefficients of numerator and denominator in z of one system behind a zero-order hold and a delay ≥ 0.
+
+    Exact; a delay adds poles at zero. For a single Transfer, whose coefficients have no further axes. Modes far slower
+    than the rate are close to z = 1, where coefficients lose digits: a hundredth of the rate leaves six.
+
+    Examples
+    --------
+    >>> numerator, denominator = to_discrete(Transfer.of([1.0], [0.5, 0.0]), 100.0)
+    >>> numerator.round(12), denominator
+    (array([0.02]), array([ 1., -1.]))
+    """
+    if delay_s < 0:
+        raise FitError(
+            "not-causal",
+            f"{delay_s=:g} is negative, and no discrete system responds before its input",
+            "hold the delay at 0",
+            delay_s=float(delay_s),
+        )
+    poles = np.exp(transfer.poles() / rate_hz)
+    places = np.concatenate([poles, np.ones(transfer.integrators)])
+    ticks = delay_s * rate_hz
+    late = int(np.floor(ticks)) + int(ticks != np.floor(ticks))
+    denominator = np.concatenate([np.poly(places).real, np.zeros(late)])
+    # The numerator is a polynomial in z − 1, found from its values on a circle around 1, about as wide as the poles.
+    count = len(denominator) - 1
+    around = _AROUND * min(max(np.max(np.abs(places - 1)), _NEAR), 2.0)
+    turn = np.exp(2j * np.pi * (np.arange(count) + 0.3) / count)
+    values = transfer.sampled(1 + around * turn, rate_hz, delay_s) * np.polyval(denominator, 1 + around * turn)
+    powers = (around * turn[:, np.newaxis]) ** np.arange(count)
+    coefficients = np.linalg.solve(powers, values).real
+    numerator = np.zeros(count)
+    for power, coefficient in enumerate(coefficients):
+        numerator[count - 1 - power :] += coefficient * np.poly(np.ones(power))
+    return numerator, denominator
+
+
+def to_continuous(numerator: ArrayLike, denominator: ArrayLike, rate_hz: float) -> Transfer:
+    """The system in s that a zero-order hold samples to this one in z, with its modes below the Nyquist frequency.
+
+    Raises
+    ------
+    FitError
+        If a pole is on the negative real axis or at zero (no system in s has one there), or the numerator's degree is
+        not below the denominator's. Poles that coincide, other than two at z = 1, cannot be separated.
+
+    Examples
+    --------
+    >>> back = to_continuous(*to_discrete(Transfer.of([3.0], [1.0, 20.0, 1e4]), 1000.0), 1000.0)
+    >>> (back.denominator / back.denominator[0]).round(6), abs(back.numerator / back.denominator[0]).round(6)
+    (array([1.e+00, 2.e+01, 1.e+04]), array([0., 3.]))
+    """
+    n, d = (_trimmed(np.atleast_1d(np.asarray(x, dtype=np.float64))) for x in (numerator, denominator))
+    if len(n) >= len(d):
+        raise FitError(
+            "not-proper",
+            f"a system of numerator degree {len(n) - 1} and denominator degree {len(d) - 1} responds without delay, "
+            "which no sampled system does",
+            "take a lower degree of the numerator",
+            numerator_degree=len(n) - 1,
+            denominator_degree=len(d) - 1,
+        )
+    places = roots(d)
+    resting = np.abs(places - 1) < np.sqrt(_AT_ONE)
+    integrators = int(np.count_nonzero(resting))
+    if integrators == 1:
+        resting = np.abs(places - 1) < _AT_ONE
+        integrators = int(np.count_nonzero(resting))
+    moving = places[~resting]
+    if np.any((moving.real <= 0) & (np.abs(moving.imag) < 1e-12 * np.abs(moving))):
+        bad = moving[(moving.real <= 0) & (np.abs(moving.imag) < 1e-12 * np.abs(moving))][0].real
+        raise FitError(
+            "no-continuous-model",
+            f"the pole z = {bad:.6g} has no counterpart in s",
+            "take another order, or a higher rate",
+            pole=float(bad),
+        )
+    poles = np.log(moving) * rate_hz
+    held = np.concatenate([(moving - 1) / poles, np.ones(integrators)])
+    parts = _parts(n, d[0], moving, integrators)
+    tick = 1 / rate_hz
+    weights = parts[: len(moving)] / held[: len(moving)]
+    of_integrators = parts[len(moving) :]
+    if integrators == 2:
+        double = of_integrators[1] / tick**2
+        of_integrators = np.array([(of_integrators[0] - tick**2 / 2 * double) / tick, double])
+    elif integrators == 1:
+        of_integrators = of_integrators / tick
+    below = np.poly(np.concatenate([poles, np.zeros(integrators)]))
+    above = np.zeros(len(below) - 1, dtype=np.complex128)
+    for i, weight in enumerate(weights):
+        others = np.concatenate([np.delete(poles, i), np.zeros(integrators)])
+        above += weight * np.poly(others)
+    for i, weight in enumerate(of_integrators):
+        others = np.concatenate([poles, np.zeros(integrators - 1 - i)])
+        above[len(above) - len(others) - 1 :] += weight * np.poly(others)
+    return Transfer(above.real, np.asarray(np.poly(poles).real, dtype=np.float64), integrators)
+
+
+def _parts(n: Floats, lead: float, poles: Complex, integrators: int) -> Complex:
+    """Weights of 1/(z − pole), and of 1/(z − 1) and 1/(z − 1)², solved at as many points as there are unknowns."""
+    count = len(poles) + integrators
+    z = _AROUND * np.exp(2j * np.pi * (np.arange(count) + 0.3) / count)
+    columns = [1 / (z - p) for p in poles] + [1 / (z - 1) ** (i + 1) for i in range(integrators)]
+    value = np.polyval(n, z) / (lead * np.polyval(np.poly(np.concatenate([poles, np.ones(integrators)])), z))
+    return np.asarray(np.linalg.solve(np.array(columns).T, value))
+
+
+def _trimmed(coefficients: Floats) -> Floats:
+    """Without leading coefficients that are rounding errors."""
+    size = np.max(np.abs(coefficients), initial=0.0)
+    above = np.flatnonzero(np.abs(coefficients) > 1e-12 * size)
+    return coefficients[above[0] :] if above.size else coefficients[-1:]

@@ -36,9 +36,9 @@ def sampled(parameters: Floats, z: Complex, rate_hz: float) -> Complex:
     >>> abs(sampled(belt, np.exp(2j * np.pi * np.array([20.0, 60.0]) / 4000), 4000)).round(3)
     array([1.357, 4.604])
     """
-    at = np.asarray(parameters, dtype=np.float64)
-    found = belt_response(BeltGrid.of(z, rate_hz), np.ascontiguousarray(at.reshape(-1, 4)))
-    return found.reshape(*at.shape[:-1], len(z))
+    values = np.asarray(parameters, dtype=np.float64)
+    response = belt_response(BeltGrid.of(z, rate_hz), np.ascontiguousarray(values.reshape(-1, 4)))
+    return response.reshape(*values.shape[:-1], len(z))
 
 
 _SCANNED = 10
@@ -52,8 +52,8 @@ def fit_windows(value: Complex, weight: Floats, z: Complex, rate_hz: float, star
     """
 
     grid, rows = BeltGrid.of(z, rate_hz), BeltRows(np.ascontiguousarray(value), np.ascontiguousarray(weight))
-    found = minimise(lambda parameters: belt_each(grid, rows, parameters), start)
-    return found.parameters, found.cost
+    minimum = minimise(lambda parameters: belt_each(grid, rows, parameters), start)
+    return minimum.parameters, minimum.cost
 
 
 def scan(value: Complex, weight: Floats, z: Complex, rate_hz: float) -> tuple[Floats, Floats]:
@@ -65,10 +65,10 @@ def scan(value: Complex, weight: Floats, z: Complex, rate_hz: float) -> tuple[Fl
     f_hz = np.abs(np.angle(z)) * rate_hz / (2 * np.pi)
     resonances = 2 * np.pi * np.geomspace(f_hz.min() / 2, f_hz.max() * 2, _SCANNED)
     start = np.concatenate([_with_resonance(omega, value, weight, z, rate_hz) for omega in resonances])
-    found, cost = fit_windows(np.tile(value, (_SCANNED, 1)), np.tile(weight, (_SCANNED, 1)), z, rate_hz, start)
+    logarithms, cost = fit_windows(np.tile(value, (_SCANNED, 1)), np.tile(weight, (_SCANNED, 1)), z, rate_hz, start)
     costs = cost.reshape(_SCANNED, -1)
     best, rows = np.argmin(costs, axis=0), np.arange(len(value))
-    return found.reshape(_SCANNED, -1, 4)[best, rows], costs[best, rows]
+    return logarithms.reshape(_SCANNED, -1, 4)[best, rows], costs[best, rows]
 
 
 def _with_resonance(omega: float, value: Complex, weight: Floats, z: Complex, rate_hz: float) -> Floats:

@@ -8,7 +8,7 @@ from html import escape
 from os import PathLike
 from typing import TYPE_CHECKING, Any, Literal
 
-from livebode.analysis import Averaged, Margins, averaged, fit_averaged, loop_report
+from livebode.analysis import Margins, RunMean, averaged, fit_averaged, loop_report
 from livebode.configuration import Axis, FitSection, MachineSection, recorded_configuration, recorded_loop
 from livebode.core import (
     Event,
@@ -138,7 +138,7 @@ class Run:
         return Table.join([Table.empty(PARAMETERS.schema), *parts])
 
     @cached_property
-    def _averaged(self) -> Averaged:
+    def _averaged(self) -> RunMean:
         return averaged(self._record)
 
     @property

@@ -187,7 +187,7 @@ EXAMPLES = {
         "an axis whose described controllers are checked and tuned",
         {"tune.parquet": _tuned},
         ("tune.toml",),
-        ("livebode run tune.toml", "livebode check-loop runs/tune", "livebode tune runs/tune"),
+        ("livebode run tune.toml", "livebode validate runs/tune --loop", "livebode tune runs/tune"),
     ),
     "design": Example(
         "before an experiment: a recording without excitation, and descriptions of two machines",

@@ -81,16 +81,16 @@ class BeltCourse(NamedTuple):
 
 def belt_response(grid: BeltGrid, parameters: Floats) -> Complex:
     """Sampled response from torque to motor velocity of each row of parameters, shape (rows, lines)."""
-    found = np.empty((len(parameters), len(grid.step)), np.complex128)
-    _native.belt_response(grid, parameters, found)
-    return found
+    response = np.empty((len(parameters), len(grid.step)), np.complex128)
+    _native.belt_response(grid, parameters, response)
+    return response
 
 
 def belt_each(grid: BeltGrid, rows: BeltRows, parameters: Floats) -> BeltNormal:
     """Normal equations of each row by itself, at parameters of shape (rows, 4)."""
-    found = BeltNormal.empty(len(parameters), 4)
-    _native.belt_each(grid, rows, parameters, found)
-    return found
+    normal = BeltNormal.empty(len(parameters), 4)
+    _native.belt_each(grid, rows, parameters, normal)
+    return normal
 
 
 def belt_together(grid: BeltGrid, rows: BeltRows, splines: BeltSplines, unknowns: Floats) -> BeltNormal:
@@ -99,9 +99,9 @@ def belt_together(grid: BeltGrid, rows: BeltRows, splines: BeltSplines, unknowns
     The unknowns are the logarithms of both inertias, the weights of the splines, and a delay of the response in
     samples, shape (3 + splines,).
     """
-    found = BeltNormal.empty(1, len(unknowns))
-    _native.belt_together(grid, rows, splines, unknowns, found)
-    return found
+    normal = BeltNormal.empty(1, len(unknowns))
+    _native.belt_together(grid, rows, splines, unknowns, normal)
+    return normal
 
 
 def belt_replay(masses: BeltMasses, course: BeltCourse) -> tuple[Floats, Floats]:
@@ -109,6 +109,6 @@ def belt_replay(masses: BeltMasses, course: BeltCourse) -> tuple[Floats, Floats]
 
     Without control and friction. If the belt diverges, the last values are not finite.
     """
-    found = np.empty(len(course.torque_n_m)), np.empty(len(course.torque_n_m))
-    _native.belt_replay(masses, course, found)
-    return found
+    velocities = np.empty(len(course.torque_n_m)), np.empty(len(course.torque_n_m))
+    _native.belt_replay(masses, course, velocities)
+    return velocities

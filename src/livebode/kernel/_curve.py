@@ -32,13 +32,13 @@ class CurveShape(NamedTuple):
 
 def curve_at(shape: CurveShape, x: Floats) -> Floats:
     """Value at each place, shape (places,)."""
-    found = np.empty(len(x))
-    _native.curve_at(shape, x, found)
-    return found
+    values = np.empty(len(x))
+    _native.curve_at(shape, x, values)
+    return values
 
 
 def curve_splines(knots: Floats, x: Floats) -> Floats:
     """Value of every spline at each place, shape (places, splines); a place beyond the ends is taken as the end."""
-    found = np.empty((len(x), len(knots) - 4))
-    _native.curve_splines(knots, x, found)
-    return found
+    values = np.empty((len(x), len(knots) - 4))
+    _native.curve_splines(knots, x, values)
+    return values

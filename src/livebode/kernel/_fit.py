@@ -110,27 +110,27 @@ class FitFound(NamedTuple):
 def fit(model: FitModel, frequency_hz: Floats, rate_hz: float, rows: FitRows) -> FitFound:
     """Weighted least squares of each row by itself (docs/explanation/fits.md); frequencies of shape (lines,)."""
     count, lines = rows.value.shape
-    found = FitFound.empty(count, lines, model.table.shape[1])
+    fits = FitFound.empty(count, lines, model.table.shape[1])
     arrays = tuple(None if x is None else np.ascontiguousarray(x) for x in rows)
-    _native.fit(model, frequency_hz, rate_hz, arrays, found)
-    return found
+    _native.fit(model, frequency_hz, rate_hz, arrays, fits)
+    return fits
 
 
-def fit_epsilon(rest: Floats, noise: Floats, size: Floats, dof: Floats) -> Floats:
-    """ε ≥ 0 with Σ 2·rest/(noise + ε²·size) = dof, (rows,); all are squares, (rows, lines), zero where not used.
+def fit_epsilon(residual: Floats, noise: Floats, size: Floats, dof: Floats) -> Floats:
+    """ε ≥ 0 with Σ 2·residual/(noise + ε²·size) = dof, (rows,); all are squares, (rows, lines), zero where not used.
 
-    Zero where noise alone explains the residuals: Σ 2·rest/noise ≤ dof.
+    Zero where noise alone explains the residuals: Σ 2·residual/noise ≤ dof.
     """
-    found = np.empty(len(rest))
-    _native.fit_epsilon(rest, noise, size, dof, found)
-    return found
+    epsilon = np.empty(len(residual))
+    _native.fit_epsilon(residual, noise, size, dof, epsilon)
+    return epsilon
 
 
 def fit_response(model: FitModel, rate_hz: float, values: Floats, frequency_hz: Floats) -> Complex:
     """Response (rows, lines) for values (rows, parameters) at frequencies (lines,) or (rows, lines)."""
-    found = np.empty((len(values), frequency_hz.shape[-1]), np.complex128)
-    _native.fit_response(model, rate_hz, values, frequency_hz, frequency_hz.ndim == 1, found)
-    return found
+    response = np.empty((len(values), frequency_hz.shape[-1]), np.complex128)
+    _native.fit_response(model, rate_hz, values, frequency_hz, frequency_hz.ndim == 1, response)
+    return response
 
 
 class FeedbackSeries(NamedTuple):
@@ -164,6 +164,6 @@ def fit_margins(
 ) -> MarginRows:
     """Margins of L = F·G for values (rows, parameters) and their covariance (rows, parameters, parameters)."""
     value, sigma, at_hz, at_sigma_hz = (np.empty((len(values), 6)) for _ in range(4))
-    found = MarginRows(value, sigma, at_hz, at_sigma_hz, np.empty(len(values), np.bool_))
-    _native.fit_margins(model, feedback, grid, np.ascontiguousarray(values), np.ascontiguousarray(covariance), found)
-    return found
+    margins = MarginRows(value, sigma, at_hz, at_sigma_hz, np.empty(len(values), np.bool_))
+    _native.fit_margins(model, feedback, grid, np.ascontiguousarray(values), np.ascontiguousarray(covariance), margins)
+    return margins

@@ -113,13 +113,13 @@ class HoppingDFT:
         return rows if samples.ndim == 2 else rows[0]
 
     def _spectra(self, windows: npt.NDArray[Any]) -> Complex:
-        """Of windows (channels, rows, N) at the bins; those above N/2 are conjugates of their mirror images."""
+        """Spectra of windows (channels, rows, N) at the bins; those above N/2 are conjugates of their mirror images."""
         kind = np.complex128 if self._dtype == np.float64 else np.complex64
         above = self._bins > self._window // 2
         places = np.where(above, self._window - self._bins, self._bins)
-        found = np.empty((*windows.shape[:2], len(places)), kind)
+        spectra = np.empty((*windows.shape[:2], len(places)), kind)
         for start in range(0, windows.shape[1], _ROWS):
             some = windows[:, start : start + _ROWS].astype(np.float64)  # NumPy takes twice as long with float32
-            found[:, start : start + _ROWS] = np.fft.rfft(some, axis=2)[:, :, places]
-        found[:, :, above] = found[:, :, above].conj()
-        return found
+            spectra[:, start : start + _ROWS] = np.fft.rfft(some, axis=2)[:, :, places]
+        spectra[:, :, above] = spectra[:, :, above].conj()
+        return spectra

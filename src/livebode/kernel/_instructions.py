@@ -68,8 +68,8 @@ def largest_sizes(samples: Floats, begun: int, window: int) -> Floats:
     array([[3. , 2. , 0.5]])
     """
     signals, count = samples.shape
-    found = np.empty((signals, 1 + max(0, -((begun - count) // window))))
+    sizes = np.empty((signals, 1 + max(0, -((begun - count) // window))))
     if count > 1 and samples.strides[1] != samples.itemsize:
         samples = np.ascontiguousarray(samples)
-    _native.largest_sizes(samples, begun, window, chosen_instruction_set(), found)
-    return found
+    _native.largest_sizes(samples, begun, window, chosen_instruction_set(), sizes)
+    return sizes

@@ -30,7 +30,7 @@ class WeightSums(NamedTuple):
 
     @classmethod
     def after(cls, count: Integers, forgetting: float, table: Floats) -> WeightSums:
-        """Those over so many windows, from their table (`LineSettings.weights`)."""
+        """Sums over so many windows, from their table (`LineSettings.weights`)."""
         if forgetting == 1:
             windows = count.astype(np.float64)
             return cls(windows, windows, windows)
@@ -40,8 +40,8 @@ class WeightSums(NamedTuple):
     def unbiased(self) -> Floats:
         """Scatter over this is the variance of one window; NaN for fewer than two windows."""
         with np.errstate(invalid="ignore"):
-            rest = self.one - self.two / self.one
-            return np.where(rest > _SEVERAL, rest, np.nan)
+            difference = self.one - self.two / self.one
+            return np.where(difference > _SEVERAL, difference, np.nan)
 
     @property
     def of_mean(self) -> Floats:
@@ -199,8 +199,8 @@ class LineRows(NamedTuple):
 def process_lines(settings: LineSettings, moments: LineMoments, windows: LineWindows) -> tuple[LineRows, float]:
     """Results of the windows, which are added to the moments, and the largest power of the reference so far."""
     rows = len(windows.whole)
-    found = _rows(rows, moments.means.shape[2], (3, rows))
-    return found, _native.process_lines(settings, moments, windows, found)
+    results = _rows(rows, moments.means.shape[2], (3, rows))
+    return results, _native.process_lines(settings, moments, windows, results)
 
 
 def process_each(settings: LineSettings, moments: list[LineMoments], windows: NewestWindows) -> tuple[LineRows, Floats]:
@@ -210,9 +210,9 @@ def process_each(settings: LineSettings, moments: list[LineMoments], windows: Ne
     an argument is refused, no moments have changed.
     """
     machines, largest = len(moments), windows.largest.copy()
-    found = _rows(machines, windows.spectrum.shape[2], (machines, 3))
-    _native.process_each(settings, moments, largest, windows.place, windows.spectrum, windows.moment, found)
-    return found._replace(moment=found.moment.T), largest
+    results = _rows(machines, windows.spectrum.shape[2], (machines, 3))
+    _native.process_each(settings, moments, largest, windows.place, windows.spectrum, windows.moment, results)
+    return results._replace(moment=results.moment.T), largest
 
 
 def _rows(rows: int, lines: int, moment: tuple[int, int]) -> LineRows:

@@ -41,7 +41,7 @@ def fit(
     /,
 ) -> None: ...
 def fit_epsilon(
-    rest: npt.NDArray[np.float64],
+    residual: npt.NDArray[np.float64],
     noise: npt.NDArray[np.float64],
     size: npt.NDArray[np.float64],
     dof: npt.NDArray[np.float64],

@@ -193,5 +193,5 @@ def judge_periods(
     plan: RepeatingPlan, state: PeriodState, periods: PeriodSpectra
 ) -> tuple[PeriodVerdicts, float, float]:
     """The verdicts, and the new `largest` and `step` of the state."""
-    found = PeriodVerdicts.empty(len(periods.usable), len(periods.distortion))
-    return found, *_native.judge_periods(plan, state, periods, found)
+    verdicts = PeriodVerdicts.empty(len(periods.usable), len(periods.distortion))
+    return verdicts, *_native.judge_periods(plan, state, periods, verdicts)

@@ -82,7 +82,7 @@ class SlidingDFT(_native.Engine):
 
     @property
     def dtype(self) -> np.dtype[Any]:
-        """Of samples and sums: float64 or float32."""
+        """Type of samples and sums: float64 or float32."""
         return self._dtype
 
     @property

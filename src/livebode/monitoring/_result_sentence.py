@@ -55,7 +55,7 @@ def _nothing(summary: Mapping[str, Any]) -> Message:
 
 def _torque(summary: Mapping[str, Any]) -> list[Message]:
     """How long friction and orders were judged."""
-    judged_s = max((found["judged_s"] for found in summary.get("torque", {}).values()), default=0.0)
+    judged_s = max((result["judged_s"] for result in summary.get("torque", {}).values()), default=0.0)
     if not judged_s:
         return []
     if "orders" in summary["torque"]:
@@ -65,15 +65,15 @@ def _torque(summary: Mapping[str, Any]) -> list[Message]:
 
 def _not_monitored(summary: Mapping[str, Any]) -> list[Message]:
     """Sentences on what a change would not have been found in."""
-    found = []
+    sentences = []
     if summary.get("idle_s"):
-        found.append(
+        sentences.append(
             Message("Not monitored for {idle_s:.1f} s: the axis did not move steadily.", idle_s=summary["idle_s"])
         )
     if named := summary.get("not_monitored"):
         longest = max(named.values())
         parts = [Message(name) for name, seconds in named.items() if seconds > longest / 2]
-        found.append(
+        sentences.append(
             Message(
                 "Not monitored for {not_monitored_s:.1f} s: too little information about {parts}.",
                 not_monitored_s=longest,
@@ -81,8 +81,8 @@ def _not_monitored(summary: Mapping[str, Any]) -> list[Message]:
             )
         )
     if places := summary.get("places_not_monitored_m"):
-        found.append(not_passed(places))
-    return found
+        sentences.append(not_passed(places))
+    return sentences
 
 
 def not_passed(places_m: Iterable[Sequence[float]]) -> Message:

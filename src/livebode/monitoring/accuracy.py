@@ -1,4 +1,4 @@
-"""Accuracy of a change as healthy windows show it, beyond that of independent noise."""
+"""Accuracy of changes, and the smallest change that would be found in a time."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ from functools import cached_property
 import numpy as np
 
 from livebode.arrays import Floats
+from livebode.core import normal_quantile
 
-_BATCHES = (2, 4, 8)
+_BATCHES = (2, 4, 8)  # windows: slow disturbances show in the means of the longer ones only
 STRETCH = 24  # windows, over which the deviations from the baseline are estimated
 _APART = 4.0  # a change is at least this many scatters
 _OFF = 1.5  # scatters are at least this many standard deviations of the baseline's own error: three are then allowed
@@ -42,7 +43,7 @@ class ChangeAccuracy:
     def at_least(self, other: ChangeAccuracy) -> ChangeAccuracy:
         """The coarser of both in each component."""
         pairs = ((getattr(self, name), getattr(other, name)) for name in self.__dataclass_fields__)
-        return ChangeAccuracy(*(np.maximum(one, two) for one, two in pairs))
+        return ChangeAccuracy(*(np.maximum(own, others) for own, others in pairs))
 
     def widened(self, by: Floats | float) -> ChangeAccuracy:
         """With a further error of the baseline of this standard deviation, (components,)."""
@@ -61,8 +62,8 @@ def accuracy(score: Floats, information: Floats, smallest: Floats, off: Floats |
         inflation = np.maximum(inflation, _mean(sums**2) / np.maximum(_mean(total), 1e-300))
     sums, total = _batched(score, STRETCH), _batched(information, STRETCH)
     known = total > 0
-    rest = np.where(known, (sums / np.where(known, total, 1.0)) ** 2 - 1 / np.where(known, total, np.inf), 0.0)
-    scatter = np.hypot(np.sqrt(np.maximum(_mean(rest), 0.0)), _OFF * off)
+    excess = np.where(known, (sums / np.where(known, total, 1.0)) ** 2 - 1 / np.where(known, total, np.inf), 0.0)
+    scatter = np.hypot(np.sqrt(np.maximum(_mean(excess), 0.0)), _OFF * off)
     return ChangeAccuracy(inflation, scatter, np.maximum(smallest, _APART * scatter))
 
 
@@ -83,3 +84,65 @@ def _mean(rows: Floats) -> Floats:
 def _batched(rows: Floats, size: int) -> Floats:
     whole = len(rows) // size * size
     return np.asarray(rows[:whole].reshape(-1, size, rows.shape[1]).sum(axis=1))
+
+
+WINDOWS = 600
+"""Windows within which a change must show: a change is named as the likeliest one after so many."""
+FOUND = 0.95
+"""Probability with which the chart of a change reaches the threshold."""
+
+_COARSER = 2.0  # than what the learned runs, or an alarm, allow: from there on a component is not monitored
+
+
+def detectable(information: Floats, accuracy: ChangeAccuracy, threshold: float) -> Floats:
+    """Change of each logarithm that raises an alarm with a probability of 95 %, (components,); infinite without any.
+
+    A chart sums g·(s − I·m), with g = smallest − allowed and m = (smallest + allowed)/2. After windows with the
+    information J = ΣI under a change δ, the sum is normal, with the mean g·J·(δ − m) and the variance g²·J; it exceeds
+    the threshold h with 95 % if δ = m + h/(g·J) + 1.64/√J. A change is reported from the smallest one on.
+
+    Parameters
+    ----------
+    information
+        Total of the windows, (components,).
+    accuracy
+        Of the healthy machine.
+    threshold
+        Of the charts.
+    """
+    gain, middle, quantile = _chart(accuracy)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        known = information / accuracy.inflation
+        change = middle + threshold / (gain * known) + quantile / np.sqrt(known)
+    return np.where(known > 0, np.maximum(change, accuracy.smallest), np.inf)
+
+
+def information_for(change: Floats, accuracy: ChangeAccuracy, threshold: float) -> Floats:
+    """Total information from which on `detectable` is at most this change, (components,)."""
+    gain, middle, quantile = _chart(accuracy)
+    beyond = change - middle
+    root = (quantile + np.sqrt(quantile**2 + 4 * beyond * threshold / gain)) / (2 * beyond)
+    return np.asarray(root**2 * accuracy.inflation)
+
+
+def information_needed(learned: Floats, accuracy: ChangeAccuracy, threshold: float) -> Floats:
+    """Information in `WINDOWS` windows below which a component is not monitored, (components,).
+
+    With it, a change is found that is twice the smallest one, or twice what windows as learned allow to find.
+
+    Parameters
+    ----------
+    learned
+        Mean information of a learned window, (components,).
+    accuracy, threshold
+        As for `detectable`.
+    """
+    finest = detectable(WINDOWS * learned, accuracy, threshold)
+    known = np.isfinite(finest)
+    change = np.where(known, _COARSER * finest, 1.0)
+    return np.where(known, information_for(change, accuracy, threshold), np.inf)
+
+
+def _chart(accuracy: ChangeAccuracy) -> tuple[Floats, Floats, float]:
+    gain, middle = accuracy.smallest - accuracy.allowed, (accuracy.smallest + accuracy.allowed) / 2
+    return gain, middle, normal_quantile(FOUND)

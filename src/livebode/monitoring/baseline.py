@@ -10,11 +10,10 @@ from livebode.core import BaselineError, Lines, counted
 from livebode.estimation import Settings
 from livebode.monitoring import baseline_file
 from livebode.monitoring.baseline_file import ROLES
-from livebode.monitoring.baseline_version import BaselineVersion, retained_file
+from livebode.monitoring.baseline_part import BaselineVersion, retained_file
 from livebode.monitoring.learned_torque import LearnedTorque
 from livebode.monitoring.machine import LearnedMachine
-from livebode.monitoring.rows import PLACES, places
-from livebode.monitoring.table import ScheduleTable
+from livebode.monitoring.table import PLACES, ScheduleTable, places
 
 _ON = {True: "on", False: "off"}
 
@@ -90,8 +89,8 @@ class Baseline:
 
     def __repr__(self) -> str:
         f, tables = self.lines.frequency_hz, [*self.tables, *(self.torque.tables if self.torque is not None else ())]
-        what = [table.what for table in tables]
-        learned = " and ".join([*what, "a model of the machine"] if self.machine is not None else what)
+        quantities = [table.what for table in tables]
+        learned = " and ".join([*quantities, "a model of the machine"] if self.machine is not None else quantities)
         span = f"{counted(len(f), 'line')}, {f[0]:g} … {f[-1]:g} Hz"
         return f"<Baseline: {learned}, {span}; learned from {counted(len(self.runs), 'run')}>"
 

@@ -16,17 +16,22 @@ from numpy.typing import NDArray
 
 from livebode.core import BaselineError, Lines, LivebodeError, write_whole, writing
 from livebode.monitoring.amplitude import InputAmplitude
-from livebode.monitoring.baseline_part import BaselinePart
-from livebode.monitoring.baseline_version import BaselineVersion
+from livebode.monitoring.baseline_part import (
+    BaselinePart,
+    BaselineVersion,
+    accuracy_of,
+    accuracy_plain,
+    as_list,
+    table_of,
+    table_plain,
+)
 from livebode.monitoring.between_runs import BetweenRuns
 from livebode.monitoring.covariates import Covariates
 from livebode.monitoring.learned_torque import LearnedTorque
 from livebode.monitoring.machine import LearnedMachine
-from livebode.monitoring.order_amplitudes import TorqueNoise
 from livebode.monitoring.ripple import Ripple
 from livebode.monitoring.sensitivity import DIRECTIONS
-from livebode.monitoring.table_file import accuracy_of, accuracy_plain, as_list, table_of, table_plain
-from livebode.monitoring.torque_model import TorqueModel
+from livebode.monitoring.torque_model import TorqueModel, TorqueNoise
 from livebode.motion import MovingModel, PositionCurve, Shaft
 from livebode.version import __version__
 
@@ -42,7 +47,7 @@ def torque_plain(learned: LearnedTorque) -> dict[str, Any]:
         "kind": model.kind,
         **{name: getattr(model, name) for name in _NUMBERS},
         **{name: as_list(getattr(model, name)) for name in _ARRAYS},
-        "shafts": [{"name": one.name, "turns": one.turns, "orders": list(one.orders)} for one in model.shafts],
+        "shafts": [{"name": shaft.name, "turns": shaft.turns, "orders": list(shaft.orders)} for shaft in model.shafts],
         "middle": learned.middle,
         "noise": None if learned.noise is None else {n: as_list(getattr(learned.noise, n)) for n in _NOISE},
         "true": as_list(learned.true),
@@ -63,7 +68,7 @@ def torque_of(data: BaselinePart) -> LearnedTorque:
     tables = [table_of(part) for part in data.parts("tables")]
     orders = tables[1] if len(tables) > 1 else None
     each = {name: data.array(name, 1, least=0, known=False) for name in ("true", "usual")}
-    count = sum(len(one.orders) for one in shafts) if orders is not None else 0
+    count = sum(len(shaft.orders) for shaft in shafts) if orders is not None else 0
     for name, values in each.items():
         if values.size != count:
             raise data.wrong(name, f"not {count} numbers")
@@ -158,23 +163,23 @@ def load(path: Path) -> dict[str, Any]:
         ) from None
     if not isinstance(data, dict) or data.get("format") != _FORMAT:
         raise BaselineError("not-a-baseline", f"{str(path)!r} is not a baseline", _LEARN, path=str(path))
-    found = data.get("version")
-    if type(found) is int and found > _VERSION:
+    version = data.get("version")
+    if type(version) is int and version > _VERSION:
         raise BaselineError(
             "newer-version",
-            f"{str(path)!r} has version {found} of its format, and this livebode reads version {_VERSION}",
+            f"{str(path)!r} has version {version} of its format, and this livebode reads version {_VERSION}",
             "update livebode",
             path=str(path),
-            found=found,
+            found=version,
             readable=_VERSION,
         )
-    if found != _VERSION:
+    if version != _VERSION:
         raise BaselineError(
             "version",
-            f"{str(path)!r} is a baseline of version {found}, and this livebode reads version {_VERSION}",
+            f"{str(path)!r} is a baseline of version {version}, and this livebode reads version {_VERSION}",
             "learn it again",
             path=str(path),
-            version=found,
+            version=version,
         )
     part = BaselinePart(str(path), "", data)
     _check(part, text)

@@ -73,8 +73,8 @@ def date_of(rows: DateRows, time_s: Floats, sample: Sequence[int], *, healthy_be
     half_s = float(np.diff(time_s).min(initial=np.inf)) / 2 if len(time_s) > 1 else 0.0
     known = rows.first > 0 or healthy_before
     earliest_s = float(time_s[max(rows.first - 1, 0)]) - half_s if known else None
-    at = rows.likeliest
-    return ChangeDate(sample[at], float(time_s[at]), earliest_s, float(time_s[rows.last]) + 3 * half_s)
+    likeliest = rows.likeliest
+    return ChangeDate(sample[likeliest], float(time_s[likeliest]), earliest_s, float(time_s[rows.last]) + 3 * half_s)
 
 
 def rows_of(score: Floats, information: Floats, time_s: Floats, scatter: Floats, inflation: float = 1.0) -> DateRows:
@@ -107,16 +107,16 @@ def rows_of(score: Floats, information: Floats, time_s: Floats, scatter: Floats,
         known = own - cross**2 * constant
         enough = known > np.finfo(float).eps * total
         amount = np.divide(left, known, out=np.zeros_like(left), where=enough)
-        found = (amount * left).sum(axis=1) / 2
-        if best is None or found.max() > evidence.max():
-            row = int(found.argmax())
+        gain = (amount * left).sum(axis=1) / 2
+        if best is None or gain.max() > evidence.max():
+            row = int(gain.argmax())
             best = row, rise[row], amount[row], constant * (total_score - cross[row] * amount[row])
-        evidence = np.maximum(evidence, found)
+        evidence = np.maximum(evidence, gain)
     assert best is not None
     row, rise, amount, offset = best
-    rest = score - information * (offset + rise[:, np.newaxis] * amount)
+    residual = score - information * (offset + rise[:, np.newaxis] * amount)
     known = information > 0
-    square = np.where(known, rest**2 / np.where(known, information, 1.0), 0.0)
+    square = np.where(known, residual**2 / np.where(known, information, 1.0), 0.0)
     scattered = max(_mean(square[part], known[part]) for part in (slice(None, row), slice(row, None)))
     likely = np.flatnonzero(evidence >= evidence.max() - _UNLIKELY * max(1.0, inflation, scattered))
     return DateRows(row, int(likely[0]), int(likely[-1]))

@@ -104,10 +104,10 @@ def with_range(names: tuple[str, ...], value: Floats) -> Covariates:
     for name, least, most, own in zip(names, low, high, noise):
         rounding = _CONSTANT * max(abs(least), abs(most))
         if most - least <= max(rounding, _NOISE * own):
-            what = f"{least:g}" if most - least <= rounding else f"{least:.6g} to {most:.6g}, no more than its noise,"
+            span = f"{least:g}" if most - least <= rounding else f"{least:.6g} to {most:.6g}, no more than its noise,"
             raise BaselineError(
                 "covariate-constant",
-                f"the covariate {name!r} is {what} in all runs, so its influence cannot be learned",
+                f"the covariate {name!r} is {span} in all runs, so its influence cannot be learned",
                 "add runs at other values, or leave it out of [monitoring] covariates",
                 channel=name,
                 low=float(least),
@@ -115,12 +115,12 @@ def with_range(names: tuple[str, ...], value: Floats) -> Covariates:
             )
     alike = np.abs(np.atleast_2d(np.corrcoef(value.T))) - np.eye(len(names))
     if alike.max() > _ALIKE:
-        one, other = (names[i] for i in np.unravel_index(int(alike.argmax()), alike.shape))
+        first, second = (names[i] for i in np.unravel_index(int(alike.argmax()), alike.shape))
         raise BaselineError(
             "covariates-correlated",
-            f"the covariates {one!r} and {other!r} are too strongly correlated in these runs ({alike.max():.3f})",
+            f"the covariates {first!r} and {second!r} are too strongly correlated in these runs ({alike.max():.3f})",
             "name one of them in [monitoring] covariates",
-            channels=[one, other],
+            channels=[first, second],
             correlation=float(alike.max()),
         )
     n = len(names)
@@ -145,5 +145,5 @@ def jackknife(estimates: Floats) -> Floats:
 
     Efron and Stein, Ann. Stat. 9, 1981: (n − 1)/n·Σ(θᵢ − θ̄)(θᵢ − θ̄)ᵀ, biased upwards if at all.
     """
-    rest = estimates - estimates.mean(axis=0)
-    return np.asarray((len(rest) - 1) / len(rest) * rest.T @ rest)
+    deviation = estimates - estimates.mean(axis=0)
+    return np.asarray((len(deviation) - 1) / len(deviation) * deviation.T @ deviation)

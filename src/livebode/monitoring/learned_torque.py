@@ -10,11 +10,9 @@ import numpy as np
 
 from livebode.arrays import Floats
 from livebode.language import Message
-from livebode.monitoring.order_amplitudes import TorqueNoise, normal_values, powers, together
-from livebode.monitoring.rows import WindowRows
 from livebode.monitoring.stretches import SampleSection
-from livebode.monitoring.table import STILL, ScheduleTable
-from livebode.monitoring.torque_model import StrokeFriction, TorqueModel
+from livebode.monitoring.table import STILL, ScheduleTable, WindowRows
+from livebode.monitoring.torque_model import StrokeFriction, TorqueModel, TorqueNoise, normal_values, powers, together
 from livebode.motion import Shaft
 
 DIRECTIONS = ("forward", "backward")
@@ -51,7 +49,7 @@ class LearnedTorque:
 
     @property
     def tables(self) -> tuple[ScheduleTable, ...]:
-        """Those of friction and orders."""
+        """Tables of friction and orders."""
         return (self.friction,) if self.orders is None else (self.friction, self.orders)
 
     @property
@@ -60,7 +58,7 @@ class LearnedTorque:
         friction, orders = self.friction, self.orders
         percent = dict(zip(friction.names, (100 * friction.accuracy.smallest).round(1).tolist()))
         known = np.isfinite(friction.mean[0, STILL].real)
-        found: dict[str, Any] = {
+        sizes: dict[str, Any] = {
             "friction_percent": {name: percent[name] for name, learned in zip(friction.names, known) if learned},
             "orders": {},
             "unit": "" if orders is None else orders.unit,
@@ -68,8 +66,8 @@ class LearnedTorque:
         if orders is not None:
             amplitude = ((1 + orders.accuracy.smallest) * orders.mean[0, STILL].real) ** 1.5
             each = zip(orders.names[: self.true.size], amplitude.tolist())
-            found["orders"] = {name: float(f"{size:.3g}") for name, size in each if np.isfinite(size)}
-        return found
+            sizes["orders"] = {name: float(f"{size:.3g}") for name, size in each if np.isfinite(size)}
+        return sizes
 
     def rows(self, section: SampleSection, rate_hz: float) -> tuple[WindowRows, ...]:
         """A row for each of `tables`; NaN where a section does not show a component."""
@@ -105,7 +103,7 @@ def friction_values(strokes: StrokeFriction, middle: float) -> Floats:
         for part in [part & (np.sign(strokes.speed) == sign)]
     ]
     weight = [np.where(part, strokes.samples, 0.0) for part in classes]
-    return np.array([one @ strokes.factor / one.sum() if one.any() else np.nan for one in weight])
+    return np.array([column @ strokes.factor / column.sum() if column.any() else np.nan for column in weight])
 
 
 def order_names(shafts: Sequence[Shaft]) -> tuple[str, ...]:

@@ -19,9 +19,8 @@ from livebode.monitoring.evidence import JUDGED, Evidence
 from livebode.monitoring.machine import LearnedMachine, cells
 from livebode.monitoring.machine_fit import joint_step, moved, normal, normal_of, step_of
 from livebode.monitoring.model_evidence import SIGNALS, ModelEvidence, held, missing, wave, way
-from livebode.monitoring.offset import Offset
 from livebode.monitoring.ripple import Ripple, amplitudes, noise_power
-from livebode.monitoring.sensitivity import DIRECTIONS
+from livebode.monitoring.sensitivity import DIRECTIONS, Offset
 from livebode.monitoring.stretches import Stretches
 from livebode.motion import MotionFitOptions, OrderSpectrum, WeightedResponses
 

@@ -11,21 +11,17 @@ from livebode.arrays import Floats
 from livebode.core import Block, Event, Lines, Stage, StatefulBase
 from livebode.language import Message
 from livebode.monitoring import evidence as word
-from livebode.monitoring.accuracy import ChangeAccuracy
-from livebode.monitoring.active_alarms import ActiveAlarms
-from livebode.monitoring.alarms import Alarm, RecentWindows
+from livebode.monitoring.accuracy import ChangeAccuracy, information_needed
+from livebode.monitoring.alarms import ActiveAlarms, Alarm, RecentWindows
+from livebode.monitoring.between_runs import RunOffset
 from livebode.monitoring.change_date import ChangeDate, date_of, independent, rows_of
 from livebode.monitoring.charts import Charts, threshold
-from livebode.monitoring.detectability import information_needed
 from livebode.monitoring.evidence import Evidence
 from livebode.monitoring.machine import LearnedMachine
 from livebode.monitoring.model_evidence import ModelEvidence
-from livebode.monitoring.monitored_time import WEAK, MonitoredTime
+from livebode.monitoring.monitored_time import WEAK, MonitoredTime, PassedPlaces
 from livebode.monitoring.naming import NamedChange, ScoredWindows, begin_of, candidates, far, lead
-from livebode.monitoring.offset import Offset
-from livebode.monitoring.passed_places import PassedPlaces
-from livebode.monitoring.run_offset import RunOffset
-from livebode.monitoring.sensitivity import DIRECTIONS
+from livebode.monitoring.sensitivity import DIRECTIONS, Offset
 from livebode.monitoring.sentences import (
     about,
     about_far,
@@ -175,10 +171,10 @@ class MachineDetector(StatefulBase):
         if not self.standing.alarms:
             self._own.step(around, known, mark, time_s)
         if self.standing.directions:
-            rest = ScoredWindows(score[np.newaxis], information[np.newaxis], np.array([position_m]))
-            rest = rest.without(self.standing.directions)
+            remaining = ScoredWindows(score[np.newaxis], information[np.newaxis], np.array([position_m]))
+            remaining = remaining.without(self.standing.directions)
             inflation = self._machine.free.inflation
-            self._further.step(rest.score[0] / inflation, np.diagonal(rest.information[0]) / inflation, mark)
+            self._further.step(remaining.score[0] / inflation, np.diagonal(remaining.information[0]) / inflation, mark)
         else:
             inflation = self._machine.held.inflation
             score, information = score / inflation, information.diagonal() / inflation
@@ -193,8 +189,8 @@ class MachineDetector(StatefulBase):
         active = self.standing.directions
         if not active:
             return np.asarray(information.diagonal() / self.time.needed)
-        rest = ScoredWindows(np.zeros((1, len(information))), information[np.newaxis], np.array([position_m]))
-        share = rest.without(active).information[0].diagonal() / self._needed_further
+        window = ScoredWindows(np.zeros((1, len(information))), information[np.newaxis], np.array([position_m]))
+        share = window.without(active).information[0].diagonal() / self._needed_further
         share[active] = np.inf
         return np.asarray(share)
 
@@ -206,13 +202,13 @@ class MachineDetector(StatefulBase):
     def _look(self) -> None:
         """Identify the change that the charts have found, if any."""
         if self._pending < 0:
-            found = [c.since[c.raised] for c in (self._first, self._further, self._cells) if c.alarmed]
+            begun = [c.since[c.raised] for c in (self._first, self._further, self._cells) if c.alarmed]
             if self._own.chart.alarmed:
                 self._own.fix()
-                found.append(self._own.chart.since[self._own.chart.raised])
-            if not found:
+                begun.append(self._own.chart.since[self._own.chart.raised])
+            if not begun:
                 return
-            self._pending = int(np.concatenate(found).min())
+            self._pending = int(np.concatenate(begun).min())
         waited = self._taken - self._pending
         if waited <= _OFTEN or waited % _SELDOM == 0:
             self._name(final=waited >= _LOOK_WINDOWS)
@@ -223,14 +219,14 @@ class MachineDetector(StatefulBase):
         beyond = self._recent.segment(first, self._reference)
         segment = self._own.segment(beyond).without(standing)
         known = self._accuracy
-        found = candidates(segment, known, self._machine.way_m, local=not standing)
-        best = found[0]
+        changes = candidates(segment, known, self._machine.way_m, local=not standing)
+        best = changes[0]
         if (several := [] if standing else far(segment, best, known)) and self._gone_around(segment):
             self._reset()
             self._stand(several, None, segment, moments)
             self._far = True
             return
-        rivals = [c for c in found[1:] if lead(segment, best, c, self._machine.free) < _DECISIVE]
+        rivals = [c for c in changes[1:] if lead(segment, best, c, self._machine.free) < _DECISIVE]
         large = abs(best.amount) >= (1.0 if final else _SMALL) * known.smallest[best.direction]
         if not final and (rivals or not large or not self._seen_around(segment, best)):
             return

@@ -13,7 +13,7 @@ from livebode.monitoring.machine import LearnedMachine
 from livebode.monitoring.sensitivity import DIRECTIONS
 from livebode.motion import PositionCurve, basis
 
-_SMOOTH = 1e-4
+_SMOOTH = 1e-4  # of the mean curvature of the cost: only what no run passed follows its neighbours
 _SLOPE_MAX = 0.5  # of a logarithm per half range of a covariate: prior standard deviation
 
 

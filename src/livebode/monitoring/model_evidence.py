@@ -15,9 +15,8 @@ from livebode.monitoring.amplitude import STRONGER
 from livebode.monitoring.covariates import window_means
 from livebode.monitoring.evidence import Evidence
 from livebode.monitoring.machine import LearnedMachine
-from livebode.monitoring.offset import Offset
 from livebode.monitoring.ripple import allowed_for
-from livebode.monitoring.sensitivity import DIRECTIONS, Replay
+from livebode.monitoring.sensitivity import DIRECTIONS, Offset, Replay
 from livebode.monitoring.stretches import LEAD_S, WindowStretch
 from livebode.motion import shaft_position, without_drift
 
@@ -66,9 +65,9 @@ class ModelEvidence:
         covariate = window_means(stretch.data[SIGNALS:], begin, lines.window)
         offset, rest_of_shift = self._shifted(offset, covariate)
         velocity, slopes = self._replay(u, x, offset)
-        rest = y - without_drift(velocity, y, lines.window)
+        residual = y - without_drift(velocity, y, lines.window)
         windows = slice(begin[0], begin[-1] + lines.window)
-        unexplained = rest[windows].reshape(-1, lines.window) @ wave((*lines.bins, *lines.quiet), lines.window)
+        unexplained = residual[windows].reshape(-1, lines.window) @ wave((*lines.bins, *lines.quiet), lines.window)
         slopes = _without_drift(slopes, lines.window)
         slope = slopes[:, windows].reshape(len(slopes), -1, lines.window) @ wave(lines.bins, lines.window)
         power = unexplained.real**2 + unexplained.imag**2
@@ -143,9 +142,9 @@ class ModelEvidence:
         u, y, x = held(stretch.data[:SIGNALS], missing(stretch.data[:SIGNALS]))
         begin = np.arange(stretch.first, stretch.last) * self._lines.window - stretch.start
         offset, _ = self._shifted(offset, window_means(stretch.data[SIGNALS:], begin, self._lines.window))
-        rest = y - without_drift(self._replay.plain(u, x, offset), y, self._lines.window)
+        difference = y - without_drift(self._replay.plain(u, x, offset), y, self._lines.window)
         shaft_m = shaft_position(x, y, self._lines.window, self._lines.rate_hz)
-        return np.vstack([rest, self._driven(x, shaft_m), shaft_m])
+        return np.vstack([difference, self._driven(x, shaft_m), shaft_m])
 
     def _driven(self, x: Floats, shaft_m: Floats) -> Floats:
         """Velocity by cosine and sine of each order of 1 N m, without drift, (2·orders, samples)."""
@@ -230,9 +229,9 @@ def held(data: Floats, bad: NDArray[np.bool_]) -> Floats:
 @lru_cache(maxsize=8)  # every axis of a process has the same few
 def wave(bins: tuple[int, ...], window: int) -> NDArray[np.complex128]:
     """From a window's samples to its spectrum at these bins, shape (window, bins); not writable."""
-    found = np.asarray(np.exp(-2j * np.pi * np.outer(np.arange(window), bins) / window))
-    found.flags.writeable = False
-    return found
+    matrix = np.asarray(np.exp(-2j * np.pi * np.outer(np.arange(window), bins) / window))
+    matrix.flags.writeable = False
+    return matrix
 
 
 def way(x: Floats, begin: NDArray[np.int64], window: int, rate_hz: float) -> tuple[Floats, Floats, NDArray[np.bool_]]:

@@ -13,7 +13,7 @@ from livebode.monitoring._result_sentence import result_sentence
 from livebode.monitoring.baseline import Baseline
 from livebode.monitoring.charts import DEFAULT_INTERVAL_S
 from livebode.monitoring.machine_detector import MachineMonitor
-from livebode.monitoring.rows import NonOverlappingWindows, WindowRows, places
+from livebode.monitoring.table import NonOverlappingWindows, WindowRows, places
 from livebode.monitoring.table_monitor import TableMonitor
 from livebode.monitoring.torque_monitor import TorqueMonitor
 
@@ -116,7 +116,7 @@ class Monitor(StatefulBase):
     def process_samples(self, block: Block) -> list[Event]:
         """Events of these samples alone: those of the model of the machine, and of friction and orders."""
         judges = (self._machine, self._torque)
-        return self._counted([event for one in judges if one is not None for event in one.process(block)])
+        return self._counted([event for judge in judges if judge is not None for event in judge.process(block)])
 
     def process_responses(self, responses: Responses, parameters: Parameters | None = None) -> list[Event]:
         """Events of these responses and parameters: those of the tables, where there is no model."""
@@ -186,8 +186,8 @@ class Monitor(StatefulBase):
         if self._machine is not None:
             return self._machine.detector.time.summary(self._step_s)
         each = [table.time.summary(self._step_s) for table in self._tables.values()]
-        best = max(each, key=lambda found: found["judged_s"])
-        named = {name: {k: v for found in each for k, v in found[name].items()} for name in _NAMED}
+        best = max(each, key=lambda time: time["judged_s"])
+        named = {name: {k: v for time in each for k, v in time[name].items()} for name in _NAMED}
         return best | named
 
     def _stages(self) -> dict[str, StatefulBase]:
@@ -212,5 +212,5 @@ class Monitor(StatefulBase):
 
 
 def _of_ready(rows: WindowRows, responses: Responses) -> WindowRows:
-    """Those of a machine that was ready: other time is reported as suppressed."""
+    """Rows of a machine that was ready: other time is reported as suppressed."""
     return rows if responses.ready.all() else rows[~np.isin(rows.sample, responses.sample[~responses.ready])]

@@ -8,8 +8,7 @@ import numpy as np
 
 from livebode.arrays import Floats
 from livebode.monitoring.accuracy import ChangeAccuracy
-from livebode.monitoring.offset import FAR, LocalChange
-from livebode.monitoring.sensitivity import DIRECTIONS
+from livebode.monitoring.sensitivity import DIRECTIONS, FAR, LocalChange
 
 # Standard deviations of a place, and the grid of its centre, as shares of the learned travel.
 _WIDTHS = np.array([0.015, 0.026, 0.045])
@@ -17,7 +16,7 @@ _GRID = 0.004
 _STIFFNESS = DIRECTIONS.index("stiffness")
 _FIRM = [DIRECTIONS.index(name) for name in ("stiffness", "load", "inertia")]  # damping doubles easily
 _EXPLAINED = 0.9  # of all evidence: a single change of ten percent of stiffness or double damping explains 0.93 … 0.99
-_CONFIDENCE = 1.96
+_CONFIDENCE = 1.96  # 95 % of a normal distribution
 _SHAPE = 0.3  # of a place's depth, which depends on its assumed shape
 
 
@@ -82,7 +81,7 @@ def candidates(segment: ScoredWindows, known: ChangeAccuracy, way_m: float, loca
     """
     score = segment.score.sum(axis=0)
     information = np.einsum("rjj->j", segment.information)
-    found = [
+    changes = [
         NamedChange(
             j, score[j] / information[j], bound(known, j, float(information[j])), score[j] ** 2 / (2 * information[j])
         )
@@ -90,8 +89,8 @@ def candidates(segment: ScoredWindows, known: ChangeAccuracy, way_m: float, loca
         if information[j] > 0
     ]
     if local and way_m > 0 and information[_STIFFNESS] > 0:
-        found.append(_place(segment, known, way_m))
-    return sorted(found, key=lambda change: -change.evidence)
+        changes.append(_place(segment, known, way_m))
+    return sorted(changes, key=lambda change: -change.evidence)
 
 
 def bound(known: ChangeAccuracy, direction: int, information: float) -> float:

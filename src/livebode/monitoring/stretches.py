@@ -133,8 +133,8 @@ class Sections(SampleBuffer):
         done: list[SampleSection] = []
         while self._stop >= (end := (self._start // self._size + 1) * self._size):
             cut = np.concatenate(self._parts, axis=1)
-            part, rest = np.split(cut, [end - self._start], axis=1)
+            part, remainder = np.split(cut, [end - self._start], axis=1)
             if part.shape[1] == self._size and np.isfinite(part).all():
                 done.append(SampleSection(part, end - 1, block.origin_s + (end - self._size / 2) / self._rate_hz))
-            self._parts, self._start = [rest.copy()], end
+            self._parts, self._start = [remainder.copy()], end
         return done

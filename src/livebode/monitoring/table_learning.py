@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from livebode.arrays import Floats
 from livebode.core import BaselineError
 from livebode.monitoring.accuracy import STRETCH, ChangeAccuracy, accuracy
-from livebode.monitoring.rows import WindowRows
-from livebode.monitoring.table import KNOWN, WAYS, WINDOWS_MIN, ScheduleTable, cells
+from livebode.monitoring.table import KNOWN, WAYS, WINDOWS_MIN, ScheduleTable, WindowRows, cells
 
 _BINS = 24
 _SMALLEST = 0.01  # of a magnitude or a parameter; radians of a phase
@@ -21,7 +20,7 @@ _STILL = 0.05  # of the fastest usual step
 _ENOUGH = 0.9  # of the cells are to be known well enough for the smallest change
 
 
-def learn_table(what: str, names: Sequence[str], runs: Sequence[WindowRows], overlap: int = 1) -> ScheduleTable:
+def learn_table(quantity: str, names: Sequence[str], runs: Sequence[WindowRows], overlap: int = 1) -> ScheduleTable:
     """Mean and covariance in 24 bins of the schedule, by direction.
 
     The runs should contain the usual speeds, directions and temperatures. The correlation of consecutive windows and
@@ -38,10 +37,10 @@ def learn_table(what: str, names: Sequence[str], runs: Sequence[WindowRows], ove
     if windows < 3 * WINDOWS_MIN:
         raise BaselineError(
             "too-few-windows",
-            f"the runs contain {windows} windows with valid {what} that do not overlap, less than the "
+            f"the runs contain {windows} windows with valid {quantity} that do not overlap, less than the "
             f"{3 * WINDOWS_MIN} that a baseline needs",
             "give longer runs, or more of them",
-            quantity=what,
+            quantity=quantity,
             windows=windows,
             windows_min=3 * WINDOWS_MIN,
         )
@@ -50,14 +49,14 @@ def learn_table(what: str, names: Sequence[str], runs: Sequence[WindowRows], ove
     low, step, still, bins = _grid(rows)
     cell, inside = cells(rows, low, step, still, bins)
     rows, cell = rows[inside], cell[inside]
-    table = _moments(what, tuple(names), (low, step, still), bins, rows, cell, overlap)
+    table = _moments(quantity, tuple(names), (low, step, still), bins, rows, cell, overlap)
     if not np.any(table.count >= WINDOWS_MIN):
         raise BaselineError(
             "too-few-windows",
-            f"a baseline needs {WINDOWS_MIN} windows of {what} in a bin of the schedule, and no bin has more than "
+            f"a baseline needs {WINDOWS_MIN} windows of {quantity} in a bin of the schedule, and no bin has more than "
             f"{int(table.count.max())}",
             "give longer runs over the whole travel, or more of them",
-            quantity=what,
+            quantity=quantity,
             windows_min=WINDOWS_MIN,
         )
     table = replace(table, accuracy=replace(table.accuracy, smallest=_smallest(table)))
@@ -84,11 +83,11 @@ def _grid(rows: WindowRows) -> tuple[float, float, float, int]:
 
 
 def _moments(
-    what: str, names: tuple[str, ...], grid: tuple[float, float, float], bins: int, rows: WindowRows,
+    quantity: str, names: tuple[str, ...], grid: tuple[float, float, float], bins: int, rows: WindowRows,
     cell: NDArray[np.intp], overlap: int,
 ) -> ScheduleTable:  # fmt: skip
     number, columns = bins * WAYS, rows.value.shape[1]
-    lines = what == "lines"
+    lines = quantity == "lines"
     parts = (columns, 2) if lines else (1, columns)
     mean = np.full((number, columns), complex(np.nan, np.nan))
     covariance = np.full((number, parts[0], parts[1], parts[1]), np.nan)
@@ -104,7 +103,7 @@ def _moments(
         covariance[i] = np.einsum("rgi,rgj->gij", part, part) / len(part) * count[i] / (count[i] - 1)
     components = 2 * columns if lines else columns
     return ScheduleTable(
-        what,
+        quantity,
         names,
         *grid,
         mean.reshape(bins, WAYS, columns),
@@ -132,8 +131,8 @@ def _off(table: ScheduleTable, cell: NDArray[np.intp], information: Floats) -> F
     cells, count = table.count.size, table.count.ravel()[:, np.newaxis]
     own = np.einsum("...ii->...i", table.covariance).reshape(cells, -1) / np.maximum(count, 1)
     stretch = np.arange(len(cell)) // STRETCH
-    pair, at = np.unique(stretch * cells + cell, return_inverse=True)
-    weight = np.stack([np.bincount(at, column) for column in information.T], axis=1)
+    pair, pair_of_row = np.unique(stretch * cells + cell, return_inverse=True)
+    weight = np.stack([np.bincount(pair_of_row, column) for column in information.T], axis=1)
     error = np.where(weight > 0, weight**2 * own[pair % cells], 0.0)
     variance, total = (np.stack([np.bincount(pair // cells, c) for c in x.T], axis=1) for x in (error, weight))
     known = total > 0

@@ -15,9 +15,8 @@ from livebode.monitoring.change_date import date_of, rows_of
 from livebode.monitoring.charts import Charts, threshold
 from livebode.monitoring.evidence import PLACE
 from livebode.monitoring.monitored_time import INVALID, THE_MACHINE, WEAK, MonitoredTime
-from livebode.monitoring.rows import WindowRows
-from livebode.monitoring.table import FRICTION, ORDERS, SECTIONS, ScheduleTable
-from livebode.monitoring.table_sentences import cleared, differs, unknown
+from livebode.monitoring.sentences import differs, table_cleared, table_unknown
+from livebode.monitoring.table import FRICTION, ORDERS, SECTIONS, ScheduleTable, WindowRows
 
 _ROWS = 31  # fewer scatter so much that rows get too little variance where the noise has risen
 _MEDIAN = 0.4549364  # of chi square with one degree of freedom
@@ -71,7 +70,7 @@ def _median(values: Floats) -> Floats:
     return np.where(count > 0, (middle[0] + middle[1]) / 2, 0.0)[..., 0]
 
 
-_FIRST = 16
+_FIRST = 16  # rows at first; then the memory grows by a quarter, so that each row is copied few times
 
 
 class NewestRows:
@@ -118,7 +117,7 @@ class NewestRows:
 _LOOK_WINDOWS = 10  # rows between detection and report, so that all changes are visible
 _LOOK_SECTIONS = 2  # the same of friction and orders: the second one is the first that is whole
 _KEPT = 600  # rows, over which the amount of a change is taken at most
-_CONFIDENCE = 1.96
+_CONFIDENCE = 1.96  # 95 % of a normal distribution
 _CHANGED_FROM = 3.0  # standard deviations, from which on a component counts among what changed
 
 
@@ -206,13 +205,13 @@ class TableMonitor(StatefulBase):
                 events += self._row(score[i], information[i], (*moment, float(cell[i])))
             elif ok and not self._told_unknown:
                 self._told_unknown = True
-                events.append(unknown(*moment))
+                events.append(table_unknown(*moment))
         return events
 
     def finish(self) -> list[Event]:
         """An alarm that is not reported yet, and the last time that was not monitored."""
-        found = self._changes() if self._found >= 0 and len(self._moment.array) else []
-        return found + self.time.finish()
+        events = self._changes() if self._found >= 0 and len(self._moment.array) else []
+        return events + self.time.finish()
 
     def _row(self, score: Floats, information: Floats, moment: tuple[float, int, float, float]) -> list[Event]:
         self._rows_judged += 1
@@ -225,7 +224,7 @@ class TableMonitor(StatefulBase):
             self._standing[:] = False
             self._charts.reset()
             self._cleared = True
-            return [cleared(self._table, moment[1], moment[2])]
+            return [table_cleared(self._table, moment[1], moment[2])]
         self._score.append(score)
         self._information.append(information)
         self._moment.append(moment)

@@ -18,10 +18,17 @@ from livebode.monitoring.learned_torque import (
     friction_values,
     order_names,
 )
-from livebode.monitoring.order_amplitudes import TorqueNoise, normal_values, powers, together
 from livebode.monitoring.stretches import SECTION_S, Sections
 from livebode.monitoring.table import FRICTION, ORDERS, STILL, WAYS, WINDOWS_MIN, ScheduleTable
-from livebode.monitoring.torque_model import OrderWindows, StrokeFriction, TorqueModel
+from livebode.monitoring.torque_model import (
+    OrderWindows,
+    StrokeFriction,
+    TorqueModel,
+    TorqueNoise,
+    normal_values,
+    powers,
+    together,
+)
 from livebode.motion import OutputKind, Shaft
 
 Run = Callable[[], Iterable[Block]]
@@ -90,7 +97,7 @@ def learn_torque(
             windows_min=WINDOWS_MIN,
         )
     middle = _middle(strokes)
-    values = np.array([friction_values(one, middle) for one in strokes])
+    values = np.array([friction_values(friction, middle) for friction in strokes])
     table = _table(FRICTION, friction_names(middle, model, _speed_unit(units[1], kind)), values, ends)
     learned = LearnedTorque(model, middle, None, np.zeros(0), np.zeros(0), table, None)
     return _with_orders(learned, orders, ends, units[0]) if shafts else learned
@@ -138,7 +145,7 @@ def _beginning(run: Run) -> Block:
             break
     if not parts:
         raise SignalError("too-short", "the run begins with a gap", "leave it out, or give another one", samples=0)
-    return replace(parts[0], data=np.concatenate([one.data for one in parts], axis=1))
+    return replace(parts[0], data=np.concatenate([part.data for part in parts], axis=1))
 
 
 def _speed_unit(output: str, kind: OutputKind) -> str:
@@ -147,15 +154,15 @@ def _speed_unit(output: str, kind: OutputKind) -> str:
 
 def _middle(strokes: Sequence[StrokeFriction]) -> float:
     """Speed between slow and fast strokes; 0 if they have about one speed."""
-    speeds = np.abs(np.concatenate([one.speed for one in strokes]))
+    speeds = np.abs(np.concatenate([friction.speed for friction in strokes]))
     low, middle, high = np.quantile(speeds, [0.1, 0.5, 0.9])
     return float(middle) if high >= _SLOW_AND_FAST * low else 0.0
 
 
 def _with_orders(learned: LearnedTorque, orders: list[list[OrderWindows]], ends: list[int], unit: str) -> LearnedTorque:
     """With the orders, if any window shows some."""
-    windows = [one for section in orders for one in section]
-    if not any(np.isfinite(one.value).any() for one in windows):
+    windows = [window for section in orders for window in section]
+    if not any(np.isfinite(window.value).any() for window in windows):
         return learned
     noise = TorqueNoise.of(windows)
     each = [powers(section, noise) for section in orders]
@@ -171,7 +178,7 @@ def _with_orders(learned: LearnedTorque, orders: list[list[OrderWindows]], ends:
     return replace(learned, noise=noise, true=true, usual=usual, orders=table)
 
 
-def _table(what: str, names: tuple[str, ...], values: Floats, ends: Sequence[int]) -> ScheduleTable:
+def _table(quantity: str, names: tuple[str, ...], values: Floats, ends: Sequence[int]) -> ScheduleTable:
     """Mean, variance and accuracy of values in the order of time, (sections, components); NaN where not known."""
     count = np.isfinite(values).sum(axis=0)
     enough = count >= WINDOWS_MIN
@@ -182,7 +189,7 @@ def _table(what: str, names: tuple[str, ...], values: Floats, ends: Sequence[int
     variance = np.where(enough, _mean(within**2) * count / np.maximum(count - lost, 1), np.nan)
     size = len(names)
     table = ScheduleTable(
-        what, names, 0.0, 0.0, 0.0,
+        quantity, names, 0.0, 0.0, 0.0,
         _in_cell(mean).astype(np.complex128), _in_cell(variance[:, np.newaxis, np.newaxis]), _in_cell(np.zeros(size)),
         np.array([[len(values) if way == STILL else 0 for way in range(WAYS)]]),
         ChangeAccuracy(np.ones(size), np.zeros(size), np.ones(size)),
@@ -192,9 +199,9 @@ def _table(what: str, names: tuple[str, ...], values: Floats, ends: Sequence[int
 
 def _in_cell(values: Floats) -> Floats:
     """These values as those of the only cell, (1, ways, …)."""
-    found = np.full((1, WAYS, *values.shape), np.nan)
-    found[0, STILL] = values
-    return found
+    cells = np.full((1, WAYS, *values.shape), np.nan)
+    cells[0, STILL] = values
+    return cells
 
 
 def _accuracy(within: Floats, variance: Floats, dof: NDArray[np.intp], between: Floats) -> ChangeAccuracy:

@@ -138,12 +138,12 @@ class FrictionCurve:
     def plain(self) -> dict[str, Any]:
         """Plain data of the curve, for JSON; bounds of 95 %."""
         bound = self.bound()
-        found: dict[str, Any] = {
+        parameters: dict[str, Any] = {
             name: {"value": float(self.value[i]), "bound": float(bound[i]), "unit": self.units[i]}
             for i, name in enumerate(self.names)
         }
         return {
-            "parameters": found,
+            "parameters": parameters,
             "covariance": self.covariance.tolist(),
             "dof": self.dof.tolist(),
             "places": self.places.tolist(),
@@ -217,11 +217,11 @@ def friction_curve(
             backward=each_way[1],
             limit=_EACH_WAY_MIN,
         )
-    at = _places(motion.position[used], places)
-    names, columns = _columns(motion, directions, at)
-    found = regress(columns, motion.input, used, motion.kernel.correlation)
-    names, found = _with_stribeck(names, columns, motion, used, found, top)
-    return _curve(names, found, motion, used, at, block, input, output, kind)
+    positions = _places(motion.position[used], places)
+    names, columns = _columns(motion, directions, positions)
+    regression = regress(columns, motion.input, used, motion.kernel.correlation)
+    names, regression = _with_stribeck(names, columns, motion, used, regression, top)
+    return _curve(names, regression, motion, used, positions, block, input, output, kind)
 
 
 def _check(places: int, band_hz: float, slowest: float | None) -> None:
@@ -239,16 +239,16 @@ def _places(position: Floats, many: int) -> Floats:
     return np.linspace(position.min(), position.max(), many) if many else np.zeros(0)
 
 
-def _columns(motion: SmoothMotion, directions: bool, at: Floats) -> tuple[list[str], Floats]:
+def _columns(motion: SmoothMotion, directions: bool, positions: Floats) -> tuple[list[str], Floats]:
     names = ["inertia", "viscous", "offset"]
     columns = [motion.acceleration, motion.velocity, np.ones(motion.velocity.size)]
     if directions:
         names.append("asymmetry")
         columns.append(np.abs(motion.velocity))
-    if at.size:
-        for j in range(at.size):
+    if positions.size:
+        for j in range(positions.size):
             names.append(f"coulomb_{j + 1}")
-            columns.append(motion.sign * np.interp(motion.position, at, np.eye(at.size)[j]))
+            columns.append(motion.sign * np.interp(motion.position, positions, np.eye(positions.size)[j]))
     else:
         names.append("coulomb")
         columns.append(motion.sign)
@@ -308,26 +308,26 @@ def _smooth_decay(motion: SmoothMotion, speed: float) -> Floats:
 
 def _curve(
     names: list[str],
-    found: Regression,
+    regression: Regression,
     motion: SmoothMotion,
     used: NDArray[np.bool_],
-    at: Floats,
+    positions: Floats,
     block: Block,
     input: str,
     output: str,
     kind: OutputKind,
 ) -> FrictionCurve:
-    u = motion.input[used] - found.value[0] * motion.acceleration[used] - found.value[names.index("offset")]
+    u = motion.input[used] - regression.value[0] * motion.acceleration[used] - regression.value[names.index("offset")]
     speeds = np.abs(motion.velocity[used])
     return FrictionCurve(
         names=tuple(names),
         units=_units(names, block.channels[block.index(input)].unit, block.channels[block.index(output)].unit, kind),
-        value=found.value,
-        covariance=found.covariance,
-        dof=found.dof,
-        places=at,
+        value=regression.value,
+        covariance=regression.covariance,
+        dof=regression.dof,
+        places=positions,
         speed=(float(speeds.min()), float(speeds.max())),
-        residual=found.residual,
+        residual=regression.residual,
         samples=int(np.count_nonzero(used)),
         excluded=int(np.count_nonzero(~used)),
         measured=np.stack([motion.velocity[used], u])[:, np.abs(motion.sign[used]) > _SLIDING],

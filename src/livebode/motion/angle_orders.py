@@ -123,8 +123,10 @@ def angle_windows(strokes: Sequence[Stroke], shaft: Shaft, turns: int = 2) -> An
         If no stroke is as long as a window.
     """
     steps = max(_STEPS_MIN, 1 << int(np.ceil(np.log2(_OVERSAMPLED * max(shaft.orders)))))
-    found = [one for number, stroke in enumerate(strokes) for one in _of_stroke(stroke, number, shaft, turns, steps)]
-    if not found:
+    windows = [
+        window for number, stroke in enumerate(strokes) for window in _of_stroke(stroke, number, shaft, turns, steps)
+    ]
+    if not windows:
         longest = max((float(np.ptp(s.angle)) * shaft.turns / (2 * np.pi) for s in strokes), default=0.0)
         raise SignalError(
             "too-short",
@@ -134,7 +136,7 @@ def angle_windows(strokes: Sequence[Stroke], shaft: Shaft, turns: int = 2) -> An
             turns=longest,
             limit=turns,
         )
-    value, stroke_of, slowest, fastest, sample = zip(*found)
+    value, stroke_of, slowest, fastest, sample = zip(*windows)
     return AngleWindows(
         np.stack(value, axis=1), np.array(stroke_of), np.array(slowest), np.array(fastest), np.array(sample)
     )
@@ -144,18 +146,18 @@ def _of_stroke(
     stroke: Stroke, number: int, shaft: Shaft, turns: int, steps: int
 ) -> Iterator[tuple[Complex, int, float, float, int]]:
     """Amplitudes, stroke, slowest and fastest speed, and middle sample of each window of a stroke."""
-    at = stroke.angle * shaft.turns / (2 * np.pi) * steps  # in steps
-    if at[-1] < at[0]:
-        at, torque, numbers = at[::-1], stroke.torque[:, ::-1], np.arange(at.size)[::-1]
+    steps_passed = stroke.angle * shaft.turns / (2 * np.pi) * steps  # in steps
+    if steps_passed[-1] < steps_passed[0]:
+        steps_passed, torque, numbers = steps_passed[::-1], stroke.torque[:, ::-1], np.arange(steps_passed.size)[::-1]
     else:
-        torque, numbers = stroke.torque, np.arange(at.size)
-    at = np.maximum.accumulate(at) + np.arange(at.size) * 1e-9
-    edges = np.arange(int(np.ceil(at[0])), int(np.floor(at[-1])) + 1)
+        torque, numbers = stroke.torque, np.arange(steps_passed.size)
+    steps_passed = np.maximum.accumulate(steps_passed) + np.arange(steps_passed.size) * 1e-9
+    edges = np.arange(int(np.ceil(steps_passed[0])), int(np.floor(steps_passed[-1])) + 1)
     window = turns * steps
     if edges.size <= window:
         return
-    when = np.interp(edges, at, np.arange(at.size))
-    even = np.stack([_means(one, when) for one in torque])
+    when = np.interp(edges, steps_passed, np.arange(steps_passed.size))
+    even = np.stack([_means(row, when) for row in torque])
     orders = np.array(shaft.orders)
     dft = SlidingDFT(window, orders * turns, channels=len(even), variant="hann")
     spectra = np.asarray(dft.process(even, hop=window // 2)).reshape(len(even), -1, orders.size)
@@ -190,7 +192,7 @@ def usable_windows(
     mass, and `turns` those of a window. The line is NaN for an order that has a window.
     """
     orders = np.array(shaft.orders)
-    low, high = (one[:, np.newaxis] * orders for one in (windows.slowest, windows.fastest))
+    low, high = (speed[:, np.newaxis] * orders for speed in (windows.slowest, windows.fastest))
     beside = _MAIN_LOBE / turns * windows.fastest[:, np.newaxis]
     met = np.zeros(low.shape, dtype=bool)
     meets = np.full(orders.size, np.nan)

@@ -36,7 +36,7 @@ class Chunk:
     torque: Floats = field(default_factory=lambda: np.zeros((0, 0)))
 
     def at_rows(self, lines: Lines, sample: NDArray[np.int64]) -> Chunk:
-        """The same with the torque of the responses whose windows end at these samples, at least one."""
+        """Chunk with the torque of the responses whose windows end at these samples, at least one."""
         apart = int(np.gcd.reduce(np.append(np.diff(sample), lines.window)))
         dft = SlidingDFT(lines.window, lines.bins)
         # Zeros in front, so that a row is due at each of the samples.
@@ -48,7 +48,7 @@ class Chunk:
     def drag(self, window: int, sample: NDArray[np.int64], inertia_kg_m2: float) -> Floats:
         """Drag torque in the direction of motion, without acceleration, over two windows up to each sample, (rows,)."""
         u = self._windows(self.u, 2 * window, sample).mean(axis=1)
-        before, after = (self._windows(self.y, window, at).mean(axis=1) for at in (sample - window, sample))
+        before, after = (self._windows(self.y, window, end).mean(axis=1) for end in (sample - window, sample))
         return np.asarray((u - inertia_kg_m2 * (after - before) * self.rate_hz / window) * np.sign(after))
 
     def _windows(self, signal: Floats, window: int, sample: NDArray[np.int64]) -> Floats:

@@ -9,16 +9,101 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Floats
-from livebode.core import Block, Channel, Emit, Event, Responses, SignalError, Stage, StatefulBase, hand_over, ignore
+from livebode.core import (
+    Block,
+    Channel,
+    Emit,
+    Event,
+    Responses,
+    SignalError,
+    Stage,
+    StatefulBase,
+    UsageError,
+    hand_over,
+    ignore,
+)
 from livebode.estimation import NOTHING, Settings, Tracker, contains
-from livebode.motion.checks import check
 from livebode.motion.chunk import Chunk, PendingResponses, RecentSamples
 from livebode.motion.learner import Learner, ReplayResult, frozen
 from livebode.motion.model import MovingModel
 from livebode.motion.orders import RippleMonitor
-from livebode.motion.replay import by_excitation, drive_of
-from livebode.motion.residual import Scatter, residual
+from livebode.motion.replay import Scatter, by_excitation, drive_of, residual
 from livebode.motion.standstill import StandstillDetector, without
+
+
+def check(
+    settings: Settings, radius_m: float, chunk_samples: int, driven_by: str, passes: int, splines: tuple[int, int]
+) -> None:
+    """Raise UsageError for arguments that a correction does not support, with the value and the remedy."""
+    if settings.input is None or settings.schedule is None:
+        raise UsageError(
+            "missing",
+            "the correction needs the input (torque) and the schedule (position)",
+            "name their channels",
+            argument="schedule" if settings.input is not None else "input",
+        )
+    for name, required in (("quantity", "plant"), ("average", False), ("estimator", "joint")):
+        value = getattr(settings, name)
+        if value not in (required, "direct"):
+            raise UsageError(
+                "conflict",
+                f"{name}={value!r} cannot be corrected for motion",
+                f"take {required!r}, or leave out the correction ([motion])",
+                argument=name,
+                value=value,
+                allowed=[required],
+            )
+    if not (np.isfinite(radius_m) and radius_m > 0):
+        raise UsageError(
+            "out-of-range",
+            f"{radius_m=} is not a positive number of metres per radian",
+            "give the radius of the pulley",
+            argument="radius_m",
+            value=radius_m,
+        )
+    _check_lengths(settings.lines.window, settings.step, chunk_samples)
+    if driven_by not in ("torque", "excitation"):
+        raise UsageError(
+            "not-one-of",
+            f"{driven_by=} is not supported",
+            "choose 'torque' or 'excitation'",
+            argument="driven_by",
+            value=driven_by,
+            allowed=["torque", "excitation"],
+        )
+    if passes < 1:
+        raise UsageError("out-of-range", f"{passes=} is not at least 1", "3 is usual", argument="passes", value=passes)
+    for name, many in zip(("stiffness_splines", "damping_splines"), splines):
+        if many != 1 and many < 4:
+            raise UsageError(
+                "out-of-range",
+                f"{name}={many} is neither 1 nor at least 4",
+                "take 1 for a constant, or 4 or more",
+                argument=name,
+                value=many,
+            )
+
+
+def _check_lengths(window: int, hop: int, chunk_samples: int) -> None:
+    if chunk_samples < 2 * window:
+        raise UsageError(
+            "out-of-range",
+            f"{chunk_samples=} is less than two windows of {window}",
+            "take a stroke",
+            argument="chunk_samples",
+            value=chunk_samples,
+            window=window,
+        )
+    if hop > window:
+        raise UsageError(
+            "out-of-range",
+            f"{hop=} is longer than the window of {window}, but a correction must follow the motion",
+            "take a shorter hop",
+            argument="hop",
+            value=hop,
+            window=window,
+        )
+
 
 _LEAD_S = 0.5  # before a chunk, for the model to reach the machine's state; a Q of 10 at 50 Hz decays in 0.06 s
 
@@ -148,11 +233,11 @@ class MotionCorrection(StatefulBase):
 
     @property
     def counts(self) -> dict[str, int]:
-        """As of a Tracker: numbers of received, missing, and excluded samples for each reason."""
+        """Numbers of received, missing, and excluded samples for each reason."""
         return self._tracker.counts
 
     def found(self) -> dict[str, Any]:
-        """As `Tracker.found`, and the model of the newest chunk: its masses, and its belt at eleven positions."""
+        """Basis of the responses, and the model of the newest chunk: its masses, and its belt at eleven positions."""
         driven_by = "torque" if self._drive is None else "excitation"
         model = None if self.model is None else self.model.plain()
         ripple = [asdict(order) for order in self._ripple.orders]
@@ -186,12 +271,12 @@ class MotionCorrection(StatefulBase):
             done.append(self._finished())
         if not self._recorded:
             self._from = block.start
-        at, rows = 0, 0
-        while at < len(block):
+        begin, rows = 0, 0
+        while begin < len(block):
             required = self._from + self._chunk + self.settings.lines.window
-            piece = block.cut(at, required - block.start)
+            piece = block.cut(begin, required - block.start)
             self._recorded.append(piece)
-            at += len(piece)
+            begin += len(piece)
             until = int(np.searchsorted(tracked.sample, piece.stop))
             self._waiting.append(tracked[rows:until])
             rows = until
@@ -250,9 +335,9 @@ class MotionCorrection(StatefulBase):
             nothing = np.full_like(tracked.value, complex(np.nan, np.nan))
             return replace(tracked, value=nothing, sigma=np.full(nothing.shape, np.nan), valid=tracked.valid & False)
         held = self._standstill.tail(chunk)
-        if self._learner.has_travelled and (found := self._standstill.stretches(now.left, chunk)):
+        if self._learner.has_travelled and (stretches := self._standstill.stretches(now.left, chunk)):
             wide = replay(self._learner.widened(tracked, chunk, now))
-            held += self._standstill.held(found, tracked, wide.seen, chunk, wide.model.rigid_kg_m2)
+            held += self._standstill.held(stretches, tracked, wide.seen, chunk, wide.model.rigid_kg_m2)
             if not held and self._learner.travels:
                 now = self._learner.completed(tracked, chunk, replay, now)
         left = without(now.left.velocity, held, chunk, self.settings.lines.window)

@@ -52,7 +52,7 @@ class MotionFitOptions:
         """From a scan of ten stiffnesses at up to 24 places: medians of the masses, curves through the rest."""
         chosen = np.unique(np.linspace(0, len(rows.value) - 1, _SCANNED_ROWS).round().astype(int))
         order = np.argsort(rows.position_m, kind="stable")[chosen]
-        found, cost = scan(rows.value[order], rows.weight[order], self.z, self.rate_hz)
+        logarithms, cost = scan(rows.value[order], rows.weight[order], self.z, self.rate_hz)
         good = np.isfinite(cost) & (cost <= 10 * np.median(cost))
         if np.count_nonzero(good) < 1:
             raise FitError(
@@ -61,25 +61,25 @@ class MotionFitOptions:
                 "check the lines, the signals and the loop",
                 rows=len(chosen),
             )
-        found, at = found[good], rows.position_m[order][good]
+        logarithms, position_m = logarithms[good], rows.position_m[order][good]
         low, high = float(rows.position_m.min()), float(rows.position_m.max())
-        found[:, :2] = np.median(found[:, :2], axis=0)
+        logarithms[:, :2] = np.median(logarithms[:, :2], axis=0)
         weights = []
         for which, splines in ((2, self.stiffness_splines), (3, self.damping_splines)):
-            shape = basis(at, low, high, splines)
+            shape = basis(position_m, low, high, splines)
             smooth = _third_differences(splines)
             matrix = shape.T @ shape + 1e-2 * smooth + 1e-9 * np.eye(splines)
-            weights.append(np.linalg.solve(matrix, shape.T @ found[:, which]))
-        return self._model(np.concatenate([found[0, :2], *weights, np.zeros(1)]), low, high)
+            weights.append(np.linalg.solve(matrix, shape.T @ logarithms[:, which]))
+        return self._model(np.concatenate([logarithms[0, :2], *weights, np.zeros(1)]), low, high)
 
     def follow(self, model: MovingModel, low: float, high: float) -> MovingModel:
         """A previous model, over another range of positions."""
-        at, arm = (
+        position_m, arm = (
             np.linspace(low, high, 8 * max(self.stiffness_splines, self.damping_splines)),
             2 * np.log(self.radius_m),
         )
         weights = [
-            np.linalg.lstsq(basis(at, low, high, splines), curve(at) + arm)[0]
+            np.linalg.lstsq(basis(position_m, low, high, splines), curve(position_m) + arm)[0]
             for curve, splines in (
                 (model.log_stiffness, self.stiffness_splines),
                 (model.log_damping, self.damping_splines),
@@ -90,8 +90,8 @@ class MotionFitOptions:
 
     def misfit(self, rows: WeightedResponses, model: MovingModel) -> float:
         """Residual of the model as a share of the weighted responses, rms."""
-        rest = sampled(model, rows.position_m, self.z, self.rate_hz) - rows.value
-        return float(np.linalg.norm(rows.weight * rest) / np.linalg.norm(rows.weight * rows.value))
+        residual = sampled(model, rows.position_m, self.z, self.rate_hz) - rows.value
+        return float(np.linalg.norm(rows.weight * residual) / np.linalg.norm(rows.weight * rows.value))
 
     def refine(self, rows: WeightedResponses, model: MovingModel, *, masses_known: bool = False) -> MovingModel:
         """Weighted least squares over all rows, started from a model; `masses_known` fixes Js, mL and the delay."""

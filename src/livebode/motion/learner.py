@@ -15,7 +15,7 @@ from livebode.estimation import Settings
 from livebode.motion.chunk import FLAT_M, Chunk, steady_rows
 from livebode.motion.fit import MotionFitOptions, WeightedResponses, sampled
 from livebode.motion.model import MovingModel, PositionCurve
-from livebode.motion.residual import Residual
+from livebode.motion.replay import Residual
 from livebode.motion.standstill import turns
 
 
@@ -89,31 +89,31 @@ class Learner(StatefulBase):
         self, tracked: Responses, now: ReplayResult
     ) -> tuple[NDArray[np.intp], MotionFitOptions, MovingModel]:
         rows = self._thinned(tracked, self._usable(tracked))
-        at = np.append(tracked.schedule[rows], (now.model.low_m, now.model.high_m))
+        position_m = np.append(tracked.schedule[rows], (now.model.low_m, now.model.high_m))
         fit = self._fit(len(now.model.log_stiffness.weights), len(now.model.log_damping.weights))
-        return rows, fit, fit.follow(now.model, float(at.min()), float(at.max()))
+        return rows, fit, fit.follow(now.model, float(position_m.min()), float(position_m.max()))
 
     def _learn(self, tracked: Responses, rows: NDArray[np.intp], chunk: Chunk, replay: Replay) -> ReplayResult | None:
         rows = self._thinned(tracked, rows)
-        at = tracked.schedule[rows]
+        position_m = tracked.schedule[rows]
         splines = self._splines if self.travels else (1, 1)
         fit = self._fit(*splines)
         best = None
-        if self.model is not None and _reaches(self.model, at, splines):
-            model = fit.follow(self.model, float(at.min()), float(at.max()))
+        if self.model is not None and _reaches(self.model, position_m, splines):
+            model = fit.follow(self.model, float(position_m.min()), float(position_m.max()))
             best = self._refined(fit, replay(model), tracked, rows, chunk, replay, max(self._passes - 2, 1))
         if best is None or best[1] > _WORSE * self._misfit:
-            raw = WeightedResponses(tracked.value[rows], chunk.torque[rows], at)
+            raw = WeightedResponses(tracked.value[rows], chunk.torque[rows], position_m)
             first = fit.refine(raw, fit.start(raw))
             if self._sound(first):
                 anew = self._refined(fit, replay(first), tracked, rows, chunk, replay, self._passes - 1)
                 best = anew if best is None or anew[1] < best[1] else best
         if best is None:
             return None if self.model is None else replay(self.model)
-        found, self._misfit = best
-        self.model = found.model
+        result, self._misfit = best
+        self.model = result.model
         self.chunks += 1
-        return found
+        return result
 
     def _refined(
         self,
@@ -187,15 +187,15 @@ class Learner(StatefulBase):
             self.model = MovingModel(inertia, load, self._radius_m, stiffness, damping, delay_s)
 
 
-def _reaches(model: MovingModel, at: Floats, splines: tuple[int, int]) -> bool:
+def _reaches(model: MovingModel, position_m: Floats, splines: tuple[int, int]) -> bool:
     """Whether a model covers enough of these positions to start from."""
     if splines != (len(model.log_stiffness.weights), len(model.log_damping.weights)):
         return False
-    outside = max(model.low_m - at.min(), at.max() - model.high_m, 0.0)
-    return bool(outside <= max(_REACH * np.ptp(at), FLAT_M))
+    outside = max(model.low_m - position_m.min(), position_m.max() - model.high_m, 0.0)
+    return bool(outside <= max(_REACH * np.ptp(position_m), FLAT_M))
 
 
 def frozen(model: MovingModel, position_m: Floats, settings: Settings) -> Complex:
     """The model's response at these fixed positions (its lowest one, where NaN), (rows, lines)."""
-    at = np.where(np.isfinite(position_m), position_m, model.low_m)
-    return sampled(model, at, settings.lines.z, settings.lines.rate_hz)
+    known_m = np.where(np.isfinite(position_m), position_m, model.low_m)
+    return sampled(model, known_m, settings.lines.z, settings.lines.rate_hz)

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from livebode.arrays import Floats
 from livebode.kernel import CurveShape, curve_at, curve_splines
 
-_DEGREE = 3
+_DEGREE = 3  # cubic: the stiffness of a belt has no bend
 _SHOWN = 11
 _BEYOND = 0.1  # of the range, on either side, where a curve continues straight
 
@@ -35,13 +35,13 @@ class PositionCurve:
     weights: Floats
 
     def __call__(self, position_m: ArrayLike) -> Floats:
-        at = np.asarray(position_m, dtype=np.float64)
+        position = np.asarray(position_m, dtype=np.float64)
         if len(self.weights) == 1:
-            return np.full(at.shape, self.weights[0])
+            return np.full(position.shape, self.weights[0])
         knots, slope, reach = _knots(self.low, self.high, len(self.weights))
         rise, fall = slope * (self.weights[1] - self.weights[0]), slope * (self.weights[-1] - self.weights[-2])
         shape = CurveShape(knots, self.weights, reach, float(rise), float(fall))
-        return curve_at(shape, np.ascontiguousarray(at.ravel())).reshape(at.shape)
+        return curve_at(shape, np.ascontiguousarray(position.ravel())).reshape(position.shape)
 
 
 def _knots(low: float, high: float, splines: int) -> tuple[Floats, float, float]:
@@ -107,22 +107,23 @@ class MovingModel:
 
     def plain(self) -> dict[str, Any]:
         """Plain data of the model: masses and radius, and the belt at eleven positions of the range."""
-        at = np.linspace(self.low_m, self.high_m, _SHOWN)
+        shown_m = np.linspace(self.low_m, self.high_m, _SHOWN)
         return {
             "inertia_kg_m2": self.inertia_kg_m2,
             "load_kg": self.load_kg,
             "radius_m": self.radius_m,
             "delay_s": self.delay_s,
-            "position_m": at.tolist(),
-            "stiffness_n_per_m": self.stiffness_at(at).tolist(),
-            "damping_n_s_per_m": self.damping_at(at).tolist(),
+            "position_m": shown_m.tolist(),
+            "stiffness_n_per_m": self.stiffness_at(shown_m).tolist(),
+            "damping_n_s_per_m": self.damping_at(shown_m).tolist(),
         }
 
     def parameters(self, position_m: ArrayLike) -> Floats:
         """Logarithms in the order of `two_masses`, shape (..., 4)."""
-        at, arm = np.asarray(position_m, dtype=np.float64), 2 * np.log(self.radius_m)
+        position, arm = np.asarray(position_m, dtype=np.float64), 2 * np.log(self.radius_m)
         js, load = np.log(self.inertia_kg_m2), np.log(self.load_kg) + arm
-        constant = np.ones(at.shape)
+        constant = np.ones(position.shape)
         return np.stack(
-            [js * constant, load * constant, self.log_stiffness(at) + arm, self.log_damping(at) + arm], axis=-1
+            [js * constant, load * constant, self.log_stiffness(position) + arm, self.log_damping(position) + arm],
+            axis=-1,
         )

@@ -164,8 +164,8 @@ class OrderSpectrum(StatefulBase):
 
     def amplitudes(self, orders: Floats) -> Floats:
         """Root mean square over the strokes of each order's amplitude, N m, (orders,)."""
-        at = np.searchsorted(self.cycles_per_m, orders)
-        return np.asarray(np.sqrt(self._torque[at] / np.maximum(self._count[at], 1)))
+        index = np.searchsorted(self.cycles_per_m, orders)
+        return np.asarray(np.sqrt(self._torque[index] / np.maximum(self._count[index], 1)))
 
     def found(self) -> Floats:
         """Orders in cycles a metre, the strongest first, at most eight."""
@@ -239,11 +239,11 @@ class RippleMonitor(StatefulBase):
             return
         slowest = min(abs(x[-1] - x[0]) * chunk.rate_hz / (x.size - 1) for _, x in strokes)
         spectrum = self._spectrum or self._make(np.array([model.high_m - model.low_m, _SLOWER * slowest]))
-        for rest, position_m in strokes:
-            spectrum.add(rest, position_m, _Gain(model, float(position_m.mean()), self._settings))
-        found = spectrum.found()
-        sizes = spectrum.amplitudes(found)
-        self.orders = tuple(RippleOrder(float(k), float(a)) for k, a in zip(found, sizes) if a > 0)
+        for torque, position_m in strokes:
+            spectrum.add(torque, position_m, _Gain(model, float(position_m.mean()), self._settings))
+        orders = spectrum.found()
+        sizes = spectrum.amplitudes(orders)
+        self.orders = tuple(RippleOrder(float(k), float(a)) for k, a in zip(orders, sizes) if a > 0)
 
     def power(self, chunk: Chunk, sample: NDArray[np.int64]) -> Floats:
         """Power of the ripple at the lines of windows that end at these samples, (rows, lines)."""

@@ -33,10 +33,10 @@ class Regression:
     def sigma(self) -> Floats:
         return np.asarray(np.sqrt(np.diag(self.covariance)))
 
-    def displaced(self, at: int, value: float) -> Regression:
+    def displaced(self, index: int, value: float) -> Regression:
         """With the value of a parameter in which the model is not linear, of which a step was fitted."""
         values = self.value.copy()
-        values[at] = value
+        values[index] = value
         return replace(self, value=values)
 
 
@@ -74,10 +74,10 @@ def regress(columns: Floats, target: Floats, used: NDArray[np.bool_], correlatio
         )
     influence = (x / scale) @ np.linalg.inv(normal) / scale  # of each sample on each value
     value = influence.T @ y
-    rest = y - x @ value
+    residual = y - x @ value
     cosines = _cosines(used)
-    covariance, dof = _covariance(influence, rest, used, cosines, correlation)
-    squares = float(rest @ rest)
+    covariance, dof = _covariance(influence, residual, used, cosines, correlation)
+    squares = float(residual @ residual)
     return Regression(value, covariance, dof, squares, float(np.sqrt(squares / max(y.size - x.shape[1], 1))))
 
 
@@ -89,18 +89,18 @@ def _cosines(used: NDArray[np.bool_]) -> Floats:
 
 
 def _covariance(
-    influence: Floats, rest: Floats, used: NDArray[np.bool_], cosines: Floats, correlation: Floats
+    influence: Floats, residual: Floats, used: NDArray[np.bool_], cosines: Floats, correlation: Floats
 ) -> tuple[Floats, NDArray[np.int64]]:
     """Covariance of the values, corrected for what the fit took out of the residuals, and degrees of freedom."""
-    sums = cosines.T @ (influence * rest[:, np.newaxis])
+    sums = cosines.T @ (influence * residual[:, np.newaxis])
     covariance = 2 / cosines.shape[1] * sums.T @ sums
     basis, _ = np.linalg.qr(influence)
     factor, dof = np.empty(influence.shape[1]), np.empty(influence.shape[1])
-    for i, one in enumerate(influence.T):
-        seen = cosines * one[:, np.newaxis]
+    for i, column in enumerate(influence.T):
+        seen = cosines * column[:, np.newaxis]
         seen -= basis @ (basis.T @ seen)
         gram = seen.T @ _correlated(seen, used, correlation)
-        true = one @ _correlated(one[:, np.newaxis], used, correlation)[:, 0]
+        true = column @ _correlated(column[:, np.newaxis], used, correlation)[:, 0]
         factor[i] = np.sqrt(true / (2 / cosines.shape[1] * np.trace(gram)))
         dof[i] = np.trace(gram) ** 2 / np.sum(gram**2)
     return covariance * np.outer(factor, factor), np.maximum(np.rint(dof), 1).astype(np.int64)
@@ -110,8 +110,8 @@ def _correlated(values: Floats, used: NDArray[np.bool_], correlation: Floats) ->
     """The correlation matrix of the used samples times these columns."""
     whole = np.zeros((used.size, values.shape[1]))
     whole[used] = values
-    found = correlation[0] * whole
+    product = correlation[0] * whole
     for lag, size in enumerate(correlation[1:], 1):
-        found[lag:] += size * whole[:-lag]
-        found[:-lag] += size * whole[lag:]
-    return np.asarray(found[used])
+        product[lag:] += size * whole[:-lag]
+        product[:-lag] += size * whole[lag:]
+    return np.asarray(product[used])

@@ -86,14 +86,14 @@ class SmoothKernel:
 
     def smooth(self, signal: Floats, derivative: int = 0) -> Floats:
         """The smoothed signal or a derivative of it per second, at the samples that have `reach` ones on both sides."""
-        at = np.arange(-self.reach, self.reach + 1) / self.sigma
-        kernel = np.exp(-0.5 * at**2)
+        distance = np.arange(-self.reach, self.reach + 1) / self.sigma
+        kernel = np.exp(-0.5 * distance**2)
         kernel /= kernel.sum()
         scale = self.rate_hz / self.sigma
         if derivative == 1:
-            kernel = -at * kernel * scale
+            kernel = -distance * kernel * scale
         elif derivative == 2:
-            kernel = (at**2 - 1) * kernel * scale**2
+            kernel = (distance**2 - 1) * kernel * scale**2
             kernel -= kernel.mean()  # what the cut ends leave: a constant has no derivative
         size = 1 << int(np.ceil(np.log2(signal.size + kernel.size)))
         product = np.fft.rfft(signal - signal[0], size) * np.fft.rfft(kernel, size)

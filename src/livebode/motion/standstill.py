@@ -12,7 +12,7 @@ from livebode.core import Event, Responses, Stage, StatefulBase
 from livebode.estimation import Settings
 from livebode.language import Message
 from livebode.motion.chunk import Chunk, steady_rows
-from livebode.motion.residual import Residual
+from livebode.motion.replay import Residual
 
 _UNEXPLAINED = 0.03  # of the output's amplitude at the lines; with dry friction |G| is then off by some 0.7 dB
 _DRAG = 0.01  # of the torque's amplitude at the lines, rms; smaller friction cannot cause the share above
@@ -66,7 +66,7 @@ class StandstillDetector(StatefulBase):
         return [StandstillStretch(self._until, self._until, 0.0)] if reaches else []
 
     def held(
-        self, found: list[tuple[int, int]], tracked: Responses, seen: Responses, chunk: Chunk, inertia_kg_m2: float
+        self, stretches: list[tuple[int, int]], tracked: Responses, seen: Responses, chunk: Chunk, inertia_kg_m2: float
     ) -> list[StandstillStretch]:
         """The stretches in which friction stops the axis.
 
@@ -75,13 +75,13 @@ class StandstillDetector(StatefulBase):
         rows = np.flatnonzero(tracked.valid.all(axis=1))
         rows = rows[np.unique(tracked.sample[rows] // max(self._window // 4, 1), return_index=True)[1]]
         torque = chunk.torque[rows]
-        rest = np.sum(np.abs(seen.value[rows] * torque) ** 2, axis=1)
+        power = np.sum(np.abs(seen.value[rows] * torque) ** 2, axis=1)
         output = np.sum(np.abs(tracked.value[rows] * torque) ** 2, axis=1)
         newest = tracked.sample[rows]
-        touches = [(newest >= first) & (newest - self._window < last) for first, last in found]
-        moving = ~np.any(touches, axis=0) & np.isfinite(rest)
+        touches = [(newest >= first) & (newest - self._window < last) for first, last in stretches]
+        moving = ~np.any(touches, axis=0) & np.isfinite(power)
         if moving.any():
-            self._noise = float(np.median(rest[moving]))
+            self._noise = float(np.median(power[moving]))
         steady = steady_rows(newest, chunk, self._window)
         if steady.any():
             self._drag = float(np.abs(np.mean(chunk.drag(self._window, newest[steady], inertia_kg_m2))))
@@ -89,11 +89,11 @@ class StandstillDetector(StatefulBase):
         amplitude = np.sqrt(2 * np.mean(np.sum(torque**2, axis=1))) / self._window
         dragged = self._drag > _DRAG * amplitude
         done = []
-        for (first, last), touch in zip(found, touches):
+        for (first, last), touch in zip(stretches, touches):
             continues = self._until >= 0 and first - self._until < self._window
             rest_of_one = continues and last - first < self._window
-            at = touch & np.isfinite(rest)
-            excess = max(np.mean(rest[at]) - self._noise, 0.0) / np.mean(output[at]) if at.any() else 0.0
+            within = touch & np.isfinite(power)
+            excess = max(np.mean(power[within]) - self._noise, 0.0) / np.mean(output[within]) if within.any() else 0.0
             stretch = StandstillStretch(first, last, float(np.sqrt(excess)))
             if rest_of_one or (dragged and stretch.unexplained > _UNEXPLAINED):
                 if not continues:
@@ -116,9 +116,9 @@ class StandstillDetector(StatefulBase):
 
 def turns(left: Residual, chunk: Chunk, first: int) -> NDArray[np.int64]:
     """Numbers of the samples, from `first` on, at which motor or cart reverses or is nearly at standstill."""
-    at, end = first - chunk.start, chunk.stop - chunk.start
-    changes = np.zeros(max(end - at - 1, 0), dtype=np.bool_)
-    for velocity in (chunk.y[at:end], left.cart[at:end]):
+    begin, end = first - chunk.start, chunk.stop - chunk.start
+    changes = np.zeros(max(end - begin - 1, 0), dtype=np.bool_)
+    for velocity in (chunk.y[begin:end], left.cart[begin:end]):
         forward, speed = velocity > 0, np.abs(velocity)
         changes |= (forward[1:] != forward[:-1]) | (speed[1:] < _SLOW * np.max(speed, initial=0.0))
     return np.asarray(first + 1 + np.flatnonzero(changes), dtype=np.int64)

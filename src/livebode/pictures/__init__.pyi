@@ -11,6 +11,7 @@ from livebode.pictures._style import shortened as shortened
 from livebode.pictures._style import style as style
 from livebode.pictures._style import wide_letters as wide_letters
 from livebode.pictures.bode import bode_figure as bode_figure
+from livebode.pictures.curves import MEAN_C as MEAN_C
 from livebode.pictures.curves import Cloud as Cloud
 from livebode.pictures.curves import Curve as Curve
 from livebode.pictures.curves import bound_db as bound_db
@@ -30,12 +31,11 @@ from livebode.pictures.plots import bound as bound
 from livebode.pictures.plots import draw_bode as draw_bode
 from livebode.pictures.plots import draw_nichols as draw_nichols
 from livebode.pictures.plots import draw_nyquist as draw_nyquist
+from livebode.pictures.plots import plot_matrix as plot_matrix
+from livebode.pictures.plots import plot_responses as plot_responses
 from livebode.pictures.png import save as save
 from livebode.pictures.png import save_pictures as save_pictures
-from livebode.pictures.response_plots import plot_matrix as plot_matrix
-from livebode.pictures.response_plots import plot_responses as plot_responses
 from livebode.pictures.scales import frequency_axis as frequency_axis
-from livebode.pictures.summary import MEAN_C as MEAN_C
 from livebode.pictures.terminal import Canvas as Canvas
 from livebode.pictures.terminal import Scale as Scale
 from livebode.pictures.terminal import terminal_bode as terminal_bode

@@ -191,12 +191,12 @@ def shortened(text: str, letters: int) -> str:
     if columns(text) <= letters:
         return text
     head = tail = ""
-    rest = text
-    while rest:
+    middle = text
+    while middle:
         if columns(head) <= columns(tail):
-            head, rest = head + rest[0], rest[1:]
+            head, middle = head + middle[0], middle[1:]
         else:
-            tail, rest = rest[-1] + tail, rest[:-1]
+            tail, middle = middle[-1] + tail, middle[:-1]
         if columns(head) + columns(tail) >= letters - 1:
             break
     return f"{head}…{tail}"

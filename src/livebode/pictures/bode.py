@@ -11,9 +11,8 @@ from livebode.core import Model, Response, Responses, decibels, moment
 from livebode.language import tr, trn
 from livebode.pictures import ticks, words
 from livebode.pictures._style import Style, drawing, empty_note, heading, new_figure, plain, style
-from livebode.pictures.curves import bound_db, bound_deg
+from livebode.pictures.curves import MEAN_PROBABILITY, PROBABILITY, Summary, bound_db, bound_deg, summarised
 from livebode.pictures.plots import FEW_LINES, alone, band, bound
-from livebode.pictures.summary import MEAN_PROBABILITY, PROBABILITY, Summary, summarised
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -61,16 +60,16 @@ def bode_figure(
         coherent = bool(np.isfinite(summary.coherence).any())
         figure = new_figure(9.0, 7.6 if coherent else 6.6)
         heading(figure, look, title or tr("Bode plot"), words.facts(responses, summary.count, names), _LEFT)
-        magnitude, phase, *rest = _panels(figure, coherent)
+        magnitude, phase, *lowest = _panels(figure, coherent)
         _draw(magnitude, look, summary, summary.magnitude_db, *_newest_db(summary), mean is None)
         _draw(phase, look, summary, summary.phase_deg, *_newest_deg(summary), mean is None)
         magnitude.set_ylabel(words.magnitude_label(responses, 46))
         phase.set_ylabel(tr("phase in degrees"))
-        if rest:
-            _draw(rest[0], look, summary, summary.coherence, *_newest_coherence(summary), mean is None)
-            rest[0].set_ylabel(tr("coherence γ²"))
+        if lowest:
+            _draw(lowest[0], look, summary, summary.coherence, *_newest_coherence(summary), mean is None)
+            lowest[0].set_ylabel(tr("coherence γ²"))
         curve = _curve(summary, fitted) if fitted is not None and summary.count else None
-        _scales(look, summary, curve, magnitude, phase, *rest)
+        _scales(look, summary, curve, magnitude, phase, *lowest)
         if summary.count:
             if curve is not None:
                 line: dict[str, Any] = {
@@ -152,7 +151,7 @@ def _draw(
 def _scales(look: Style, summary: Summary, curve: tuple[Floats, ...] | None, *panels: Axes) -> None:
     from livebode.pictures.scales import frequency_axis
 
-    magnitude, phase, *rest = panels
+    magnitude, phase, *lowest = panels
     for axes in panels:
         plain(axes)
         axes.yaxis.set_label_coords(-0.066, 0.5)
@@ -164,9 +163,9 @@ def _scales(look: Style, summary: Summary, curve: tuple[Floats, ...] | None, *pa
         phase, np.concatenate([summary.phase_deg.ravel(), deg]), _newest_deg(summary), deg, room=10.0
     )
     phase.set_yticks(ticks.phase_ticks(low_deg, high_deg))
-    if rest:
-        rest[0].set_ylim(-0.04, 1.06)
-        rest[0].set_yticks([0.0, 0.5, 1.0])
+    if lowest:
+        lowest[0].set_ylim(-0.04, 1.06)
+        lowest[0].set_yticks([0.0, 0.5, 1.0])
     if not summary.count:
         empty_note(magnitude, look)
         for axes in (magnitude, phase):

@@ -1,15 +1,16 @@
-"""Curves with bounds, and the numbers that are drawn of them: unwrapped degrees, quantiles, ends of bounds."""
+"""Curves with bounds, the numbers that are drawn of them, and the summary of all responses of a run."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import log, sqrt
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Floats
-from livebode.core import decibels
+from livebode.core import Response, Responses, decibels
 
 SPAN = (0.05, 0.95)
 FLOOR_DB = -1000.0
@@ -52,14 +53,14 @@ def quantiles(values: Floats) -> Floats:
     ordered = np.sort(np.ascontiguousarray(values.T), axis=1)
     count = np.count_nonzero(np.isfinite(ordered), axis=1)
     every = np.arange(len(ordered))
-    found = []
+    rows = []
     for q in (SPAN[0], 0.5, SPAN[1]):
         position = q * np.maximum(count - 1, 0)
         below = position.astype(np.intp)
         above = np.minimum(below + 1, np.maximum(count - 1, 0))
         low, high = ordered[every, below], ordered[every, above]
-        found.append(low + (high - low) * (position - below))
-    return np.array(found)
+        rows.append(low + (high - low) * (position - below))
+    return np.array(rows)
 
 
 def unwrapped(phase_deg: Floats, weak: NDArray[np.bool_]) -> Floats:
@@ -72,15 +73,15 @@ def unwrapped(phase_deg: Floats, weak: NDArray[np.bool_]) -> Floats:
     lead = known & ~weak if np.any(known & ~weak) else known
     if not np.any(lead):
         return phase_deg.copy()
-    at = np.arange(len(phase_deg))
+    index = np.arange(len(phase_deg))
     led = np.unwrap(phase_deg[lead], period=360.0)
     middle = (led.min() + led.max()) / 2
     led -= 360.0 * np.floor((middle - _TURN_FROM_DEG) / 360.0)
-    return near(phase_deg, np.interp(at, at[lead], led))
+    return near(phase_deg, np.interp(index, index[lead], led))
 
 
 def near(phase_deg: Floats, reference_deg: Floats) -> Floats:
-    """The same angles on the branch within half a turn of the reference."""
+    """Angles on the branch within half a turn of the reference."""
     return np.asarray(phase_deg - 360.0 * np.rint((phase_deg - reference_deg) / 360.0))
 
 
@@ -140,3 +141,65 @@ class Cloud:
     def label(self) -> str:
         """In the legend of a Bode plot."""
         return f"5–95 % of {len(self.value)} responses"
+
+
+# The probability of ±3 standard deviations of a normal variable, used for the circle around a complex response.
+PROBABILITY = 0.9973
+BOUND_C = sqrt(-log(1 - PROBABILITY))
+MEAN_PROBABILITY = 0.95
+MEAN_C = sqrt(-log(1 - MEAN_PROBABILITY))
+
+
+@dataclass(frozen=True)
+class Summary:
+    """5 %, 50 % and 95 % quantiles over the run, each of shape (3, lines); NaN for a line that was never valid.
+
+    `magnitude_db` in dB, `phase_deg` unwrapped along frequency, `coherence` between 0 and 1. `newest` is the last row
+    in which any line is valid, or None; `newest_phase_deg` is on the branch of the median.
+    """
+
+    responses: Responses
+    count: int
+    magnitude_db: Floats
+    phase_deg: Floats
+    coherence: Floats
+    newest: Response | None
+    newest_value: NDArray[np.complex128]
+    newest_bound: Floats
+    newest_phase_deg: Floats
+
+
+def summarised(responses: Responses, mean: Response | None = None) -> Summary:
+    """Compute median, range and newest response of a run; never raises, whatever is missing.
+
+    A `mean` of the run replaces the newest response, with its 95 % bound.
+    """
+    use = usable(responses)
+    value = np.where(use, responses.value, np.nan)
+    rows = np.flatnonzero(use.any(axis=1))
+    newest = responses[int(rows[-1])] if rows.size else None
+    newest_value = value[rows[-1]] if rows.size else np.full(len(responses.lines), complex(np.nan))
+    bound = responses[int(rows[-1])].bound(BOUND_C) if rows.size else np.full(len(responses.lines), np.nan)
+    if mean is not None:
+        newest, bound = mean, mean.bound(MEAN_C)
+        newest_value = np.where(mean.valid & np.isfinite(mean.value) & (mean.value != 0), mean.value, np.nan)
+    magnitude_db = quantiles(decibels(value))
+    middle_deg, deviation_deg = circular(value)
+    weak = np.isfinite(bound) & (bound > np.abs(newest_value))
+    phase = unwrapped(middle_deg, weak)
+    return Summary(
+        responses=responses,
+        count=int(rows.size),
+        magnitude_db=magnitude_db,
+        phase_deg=phase + deviation_deg - deviation_deg[1],
+        coherence=quantiles(np.where(use & np.isfinite(responses.coherence), responses.coherence, np.nan)),
+        newest=newest,
+        newest_value=newest_value,
+        newest_bound=np.where(np.isfinite(newest_value), bound, np.nan),
+        newest_phase_deg=near(np.degrees(np.angle(newest_value)), phase),
+    )
+
+
+def usable(responses: Responses) -> NDArray[np.bool_]:
+    """Mask of the values that can be drawn: valid, finite and not zero, shape (rows, lines)."""
+    return np.asarray(responses.valid & np.isfinite(responses.value) & (responses.value != 0))

@@ -88,10 +88,10 @@ def gridded(x: Floats, values: Floats, cells_max: int) -> tuple[Floats, Floats]:
     low, high = float(x.min()), float(x.max())
     cells = max(1, min(cells_max, len(x)))
     step = (high - low) / max(cells - 1, 1) or 1.0
-    at = np.clip(np.rint((x - low) / step).astype(np.intp), 0, cells - 1)
+    cell = np.clip(np.rint((x - low) / step).astype(np.intp), 0, cells - 1)
     edges = low + step * (np.arange(cells + 1) - 0.5)
-    order = np.argsort(at, kind="stable")
-    bounds = np.searchsorted(at[order], np.arange(cells + 1))
+    order = np.argsort(cell, kind="stable")
+    bounds = np.searchsorted(cell[order], np.arange(cells + 1))
     if len(x) == cells and np.all(np.diff(bounds) == 1):
         return np.asarray(edges), np.asarray(values[order])
     out = np.full((cells, values.shape[1]), np.nan)

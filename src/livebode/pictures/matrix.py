@@ -14,10 +14,9 @@ from livebode.arrays import Floats
 from livebode.core import REASONS, MatrixResponses, decibels, moment
 from livebode.language import tr, worded
 from livebode.pictures._style import Style, drawing, heading, new_figure, plain, shortened, style
-from livebode.pictures.curves import bound_db
+from livebode.pictures.curves import BOUND_C, PROBABILITY, bound_db
 from livebode.pictures.plots import FEW_LINES, alone, bound
 from livebode.pictures.png import save
-from livebode.pictures.summary import BOUND_C, PROBABILITY
 from livebode.pictures.words import lines_phrase
 
 if TYPE_CHECKING:
@@ -133,9 +132,9 @@ def _panels(figure: Figure, down: int, across: int) -> NDArray[np.object_]:
     return panels
 
 
-def _entry(pair: Sequence[Axes], look: Style, responses: MatrixResponses, at: tuple[int, int]) -> None:
+def _entry(pair: Sequence[Axes], look: Style, responses: MatrixResponses, place: tuple[int, int]) -> None:
     """Title of one Bode plot, its invalid lines, and the reason if all are."""
-    o, i = at
+    o, i = place
     magnitude, phase = pair
     units = responses.units[o] if responses.units else ()
     unit = f", re 1 {units[i]}" if len(set(units)) > 1 and units[i] else ""  # a symbol in every language

@@ -30,10 +30,10 @@ def frequency_axis(axes: Axes, frequency_hz: Floats, labels: bool) -> None:
     _short_ticks(axes, ticks.minor_frequency_ticks(low_hz, high_hz))
 
 
-def _short_ticks(axes: Axes, at: list[float]) -> None:
+def _short_ticks(axes: Axes, places: list[float]) -> None:
     """Minor ticks at these places: as markers of one line, which look the same and take less time."""
     axes.plot(
-        at, np.zeros(len(at)), linestyle="", marker=TICKDOWN, markersize=rcParams["xtick.minor.size"],
+        places, np.zeros(len(places)), linestyle="", marker=TICKDOWN, markersize=rcParams["xtick.minor.size"],
         markeredgewidth=rcParams["xtick.minor.width"], color=rcParams["xtick.color"], zorder=2.01, clip_on=False,
         transform=axes.get_xaxis_transform(),
     )  # fmt: skip

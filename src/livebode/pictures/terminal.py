@@ -16,7 +16,7 @@ from livebode.arrays import Floats
 from livebode.core import Responses, counted
 from livebode.pictures import ticks, words
 from livebode.pictures._style import shortened
-from livebode.pictures.summary import Summary, summarised
+from livebode.pictures.curves import Summary, summarised
 
 _WIDTH_MIN, _HEIGHT_MIN = 40, 16
 _BRAILLE = np.array([[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]])
@@ -63,20 +63,20 @@ def _picture(summary: Summary, width: int, height: int, colour: bool, unicode: b
     most = max((upper - 2) // 2, 2)
     ranges = [_range(magnitude_db, 1.0), _range(phase_deg, 5.0)]
     ticks_at = [ticks.linear_ticks(*ranges[0], most=most), ticks.phase_ticks(*ranges[1], most=max(most - 1, 2))]
-    labels = [[f"{t:g}" for t in at] for at in ticks_at]
+    labels = [[f"{t:g}" for t in marks] for marks in ticks_at]
     margin = max(len(label) for panel in labels for label in panel)
     columns = width - margin - 2
     frequency = _frequency_scale(summary, columns)
     unit = words.magnitude_label(summary.responses, columns)
     lines: list[str] = []
-    for values, title, rows, limits, at in (
+    for values, title, rows, limits, marks in (
         (magnitude_db, unit, upper - 3, ranges[0], dict(zip(ticks_at[0], labels[0]))),
         (phase_deg, "phase in degrees", height - upper - 4, ranges[1], dict(zip(ticks_at[1], labels[1]))),
     ):
         canvas = Canvas.blank(rows, columns)
         level = Scale(limits[1], limits[0], rows)
         _curve(canvas, frequency, level, summary.responses.lines.frequency_hz, values)
-        marked = {level.cell(tick): label for tick, label in at.items()}
+        marked = {level.cell(tick): label for tick, label in marks.items()}
         lines.append(written(title, width, unicode).center(width).rstrip())
         for row in range(rows):
             side = f"{marked.get(row, ''):>{margin}}{'┤' if row in marked else '│'}"
@@ -96,9 +96,9 @@ def _frequency_axis(summary: Summary, scale: Scale, margin: int) -> list[str]:
     low_hz, high_hz = ticks.frequency_limits(summary.responses.lines.frequency_hz)
     most = max(3, min(10, scale.cells // 9))
     for tick_hz in ticks.line_ticks(summary.responses.lines.frequency_hz, low_hz, high_hz, most=most):
-        at, label = scale.cell(float(np.log10(tick_hz))), ticks.frequency_label(tick_hz)
-        edge[at] = "┬"
-        begin = min(at - (len(label) - 1) // 2, scale.cells - len(label))
+        column, label = scale.cell(float(np.log10(tick_hz))), ticks.frequency_label(tick_hz)
+        edge[column] = "┬"
+        begin = min(column - (len(label) - 1) // 2, scale.cells - len(label))
         if begin > len(numbers) or not numbers:
             numbers = numbers.ljust(begin) + label
     return [" " * margin + f"└{''.join(edge)}┘", " " * (margin + 1) + numbers]

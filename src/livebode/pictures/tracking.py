@@ -12,8 +12,8 @@ from livebode.core import Responses, decibels
 from livebode.language import numerals, tr
 from livebode.pictures import ticks, words
 from livebode.pictures._style import Style, drawing, empty_note, heading, new_figure, plain, shortened, style
+from livebode.pictures.curves import BOUND_C, PROBABILITY, usable
 from livebode.pictures.map import draw_maps
-from livebode.pictures.summary import BOUND_C, PROBABILITY, usable
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -72,9 +72,9 @@ def tracking_figure(
 
 def scheduled(responses: Responses, use: NDArray[np.bool_]) -> bool:
     """Whether the scheduling signal has at least two values at valid responses."""
-    at = responses.schedule[use.any(axis=1)]
-    at = at[np.isfinite(at)]
-    return bool(at.size > 1 and at.max() > at.min())
+    schedule = responses.schedule[use.any(axis=1)]
+    schedule = schedule[np.isfinite(schedule)]
+    return bool(schedule.size > 1 and schedule.max() > schedule.min())
 
 
 def _empty(figure: Figure, look: Style, responses: Responses, left: float) -> None:
@@ -150,8 +150,8 @@ def with_holes(time_s: Floats, columns: list[Floats]) -> tuple[Floats, list[Floa
     """Insert a NaN row at each jump of the time, so that no line is drawn across a gap of the recording."""
     steps = np.diff(time_s)
     usual = float(np.median(steps)) if steps.size else 0.0
-    at = np.flatnonzero((steps > _HOLE_STEPS * usual) | (steps < 0)) + 1 if usual > 0 else np.zeros(0, dtype=np.intp)
-    return np.insert(time_s, at, time_s[at - 1]), [np.insert(c, at, np.nan, axis=0) for c in columns]
+    jumps = np.flatnonzero((steps > _HOLE_STEPS * usual) | (steps < 0)) + 1 if usual > 0 else np.zeros(0, dtype=np.intp)
+    return np.insert(time_s, jumps, time_s[jumps - 1]), [np.insert(c, jumps, np.nan, axis=0) for c in columns]
 
 
 def _against_schedule(
@@ -172,10 +172,10 @@ def _against_schedule(
             x[known], bounds[0][known, i], bounds[1][known, i], color=colour, alpha=faint, linewidth=1.5, gid="bound"
         )
         for fall, face in ((False, colour), (True, look.paper)):
-            at = falling == fall
+            rows = falling == fall
             axes.plot(
-                x[at],
-                magnitude_db[at, i],
+                x[rows],
+                magnitude_db[rows, i],
                 "o",
                 markersize=size,
                 markeredgewidth=0.7,
@@ -216,8 +216,8 @@ def _name_lines(axes: Axes, responses: Responses, magnitude_db: Floats, colours:
     low, high = axes.get_ylim()
     height_pt = axes.get_position().height * axes.figure.get_size_inches()[1] * 72  # type: ignore[union-attr]
     ended = [(i, c[np.isfinite(c)][-1]) for i, c in enumerate(magnitude_db.T) if np.isfinite(c).any()]
-    at = spread(np.array([(level - low) / (high - low) for _, level in ended]), 12.0 / height_pt)
-    for (i, level), y in zip(ended, at):
+    heights = spread(np.array([(level - low) / (high - low) for _, level in ended]), 12.0 / height_pt)
+    for (i, level), y in zip(ended, heights):
         axes.annotate(
             f"{numerals(ticks.frequency_label(responses.lines.frequency_hz[i]))} Hz",
             xy=(1.0, (level - low) / (high - low)),

@@ -40,18 +40,18 @@ def lines_phrase(responses: Responses | MatrixResponses) -> str:
     f = responses.lines.frequency_hz
     if len(f) == 1:
         return tr("1 line, {at} Hz", at=numerals(frequency_label(f[0])))
-    low, high = (numerals(frequency_label(at)) for at in (f[0], f[-1]))
+    low, high = (numerals(frequency_label(f_hz)) for f_hz in (f[0], f[-1]))
     return tr("{count} lines, {low}–{high} Hz", count=len(f), low=low, high=high)
 
 
 def facts(responses: Responses, valid_rows: int, names: tuple[str, str] | None = None) -> str:
     """The line below the title: quantity, channels, lines, and how much is valid."""
-    what = quantity(responses)
+    description = quantity(responses)
     if names:
         first, second = (shortened(name, 30) for name in names)
-        what = tr("{quantity} from {input} to {output}", quantity=what, input=first, output=second)
+        description = tr("{quantity} from {input} to {output}", quantity=description, input=first, output=second)
     valid = trn("{valid} of {n} response valid", "{valid} of {n} responses valid", len(responses), valid=valid_rows)
-    return f"{what} · {lines_phrase(responses)} · {valid}"
+    return f"{description} · {lines_phrase(responses)} · {valid}"
 
 
 def labelled(name: str, unit: str) -> str:

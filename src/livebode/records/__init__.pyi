@@ -2,6 +2,7 @@ from livebode.records._query import query as query
 from livebode.records._result_rows import MATRIX_TABLES as MATRIX_TABLES
 from livebode.records._result_rows import RESPONSE_TABLES as RESPONSE_TABLES
 from livebode.records._result_rows import result_rows as result_rows
+from livebode.records.column_table import ColumnTable as ColumnTable
 from livebode.records.confined_sql import QueryResult as QueryResult
 from livebode.records.confined_sql import QueryTables as QueryTables
 from livebode.records.confined_sql import answer_query as answer_query
@@ -70,6 +71,5 @@ from livebode.records.stored_precision import in_stored_precision as in_stored_p
 from livebode.records.summary_file import RUN as RUN
 from livebode.records.summary_file import read_summary as read_summary
 from livebode.records.summary_shape import what_is_wrong as what_is_wrong
-from livebode.records.table_file import ColumnTable as ColumnTable
 from livebode.records.tiers import Thinning as Thinning
 from livebode.records.tiers import thinned as thinned

@@ -10,14 +10,13 @@ from livebode.core import Event, RunClock, moment, moments_by, needing
 from livebode.records.confined_sql import QueryResult, QueryTables, answer_query
 from livebode.records.grouped_events import each_event, event_rows
 from livebode.records.json_format import to_json
-from livebode.records.run import Files, RunRecord
+from livebode.records.run import RunRecord
 from livebode.records.segments.manifest import TIERS
 from livebode.records.segments.verified_files import segment_groups
 
 with needing("PyArrow", "query", "a query"):
     import pyarrow as pa
     import pyarrow.dataset as ds
-    from pyarrow.fs import LocalFileSystem
 
 _TABLES = ("responses", "covariance", "parameters", "samples", *TIERS)
 _SINGLE_EVENTS = pa.schema(
@@ -69,18 +68,16 @@ def query(run: RunRecord, sql: str, rows_max: int) -> QueryResult:
 
 
 def _known(run: RunRecord) -> list[str]:
-    in_segments = run.parts()
-    if in_segments is None:
-        return ["events", "single_events", *run.files(_TABLES)]
-    found = {segment.table for segment in in_segments[0]} | in_segments[1].keys()
-    return ["events", "single_events", *(table for table in _TABLES if table in found)]
+    segments, rows = run.parts()
+    recorded = {segment.table for segment in segments} | rows.keys()
+    return ["events", "single_events", *(table for table in _TABLES if table in recorded)]
 
 
 def _show(run: RunRecord, database: Any, asked: set[str], damages: list[Event]) -> None:
     """Register the requested tables of the run, and its events, in the database."""
     tables = [table for table in _TABLES if table in asked]
     if asked & {"events", "single_events"}:
-        run.files(tables)  # so that these have the damage of the requested tables
+        run.check(tables)  # so that these have the damage of the requested tables
     for table, parts in _parts_of(run, tables, damages).items():
         selected = []
         for number, part in enumerate(parts):
@@ -109,16 +106,13 @@ class _Part:
 
 def _parts_of(run: RunRecord, tables: list[str], damages: list[Event]) -> dict[str, list[_Part]]:
     """The recorded ones of these tables in parts."""
-    in_segments = run.parts()
-    if in_segments is None:
-        return {table: [_Part(_dataset(files))] for table, files in run.files(tables).items()}
-    segments, rows = in_segments
-    found: dict[str, list[_Part]] = {}
+    segments, rows = run.parts()
+    parts: dict[str, list[_Part]] = {}
     for table in tables:
-        groups = segment_groups(run.path, [one for one in segments if one.table == table], damages)
-        found[table] = [_Part(group.rows, group.first_s, group.last_s) for group in groups]
-        found[table] += [_Part(pa.table(batch)) for batch in rows.get(table, ())]
-    return {table: parts for table, parts in found.items() if parts}
+        groups = segment_groups(run.path, [segment for segment in segments if segment.table == table], damages)
+        parts[table] = [_Part(group.rows, group.first_s, group.last_s) for group in groups]
+        parts[table] += [_Part(pa.table(batch)) for batch in rows.get(table, ())]
+    return {table: of_table for table, of_table in parts.items() if of_table}
 
 
 def _plain(event: Event, clock: RunClock) -> dict[str, Any]:
@@ -130,11 +124,3 @@ def _nan_as_null(schema: pa.Schema) -> str:
     """All columns, with null for missing values, which SQL's averages ignore."""
     numbers = [field.name for field in schema if pa.types.is_float64(field.type) and field.name not in _NEVER_MISSING]
     return "* REPLACE (" + ", ".join(f"CASE WHEN isnan({n}) THEN NULL ELSE {n} END AS {n}" for n in numbers) + ")"
-
-
-def _dataset(files: Files) -> ds.Dataset:
-    if files.groups is None:
-        return ds.dataset(files.paths, format="parquet")
-    parquet = ds.ParquetFileFormat()
-    fragment = parquet.make_fragment(str(files.paths[0]), LocalFileSystem(), row_groups=files.groups)
-    return ds.FileSystemDataset([fragment], fragment.physical_schema, parquet, LocalFileSystem())

@@ -7,9 +7,9 @@ from functools import singledispatch
 from typing import Any
 
 from livebode.core import MatrixResponses, Parameters, Responses
+from livebode.records.column_table import ColumnTable
 from livebode.records.matrix_table import COVARIANCE, MATRIX_RESPONSES, covariance_rows, matrix_rows
 from livebode.records.response_table import PARAMETERS, RESPONSES, as_batch, parameter_rows
-from livebode.records.table_file import ColumnTable
 from livebode.tables import Table
 
 RESPONSE_TABLES: Mapping[str, ColumnTable] = {"responses": RESPONSES, "parameters": PARAMETERS}

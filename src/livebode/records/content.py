@@ -38,10 +38,10 @@ def content_sha256(path: Path) -> str:
         if path.is_dir():
             files = sorted(file for file in path.rglob("*") if file.is_file())
             return joined_sha256([content_sha256(file) for file in files])
-        found = path.stat()
-        if time.time_ns() - found.st_mtime_ns < _SAME_TIME_NS:
+        status = path.stat()
+        if time.time_ns() - status.st_mtime_ns < _SAME_TIME_NS:
             return _digest(path)
-        return _digest_once(path, found.st_dev, found.st_ino, found.st_size, found.st_mtime_ns)
+        return _digest_once(path, status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns)
     except FileNotFoundError:
         raise RecordingError("not-found", f"there is no file {path}", "check the name", path=str(path)) from None
     except OSError as error:

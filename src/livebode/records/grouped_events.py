@@ -31,7 +31,7 @@ def event_counts(event: Event) -> Counter[str]:
     >>> sorted(event_counts(line).items())
     [('gap', 41), ('loss', 1)]
     """
-    counts, counted = Counter(one.kind for one in each_event(event)), event.details.get("counted")
+    counts, counted = Counter(each.kind for each in each_event(event)), event.details.get("counted")
     if isinstance(counted, dict):
         counts.update({str(kind): number for kind, number in counted.items() if type(number) is int and number > 0})
     return counts
@@ -41,12 +41,12 @@ def _repeats(event: Event) -> list[Event]:
     """Events in the event's details; none if they are not in the form of a run, because a record is untrusted data."""
     repeats = event.details.get("repeats")
     try:
-        found = [Event(*repeat) for repeat in repeats] if isinstance(repeats, list) else []
+        events = [Event(*repeat) for repeat in repeats] if isinstance(repeats, list) else []
     except TypeError:
         return []
     shape: tuple[type | tuple[type, ...], ...] = (str, int, (int, float), str, dict)
-    plain = all(isinstance(value, kind) for one in found for value, kind in zip(vars(one).values(), shape))
-    return found if plain else []
+    plain = all(isinstance(value, kind) for each in events for value, kind in zip(vars(each).values(), shape))
+    return events if plain else []
 
 
 def group_of(event: Event) -> tuple[str, int] | None:
@@ -96,14 +96,14 @@ def event_rows(events: Iterable[Event]) -> list[EventRow]:
         if group is None:
             rows.append(EventRow(event, 1, event.time_s, event.time_s))
             continue
-        known = {one.kind: one for one in each_event(event)}
+        known = {each.kind: each for each in each_event(event)}
         for kind, count in event_counts(event).items():
             row = of.get((group[0], kind))
             newest = known.get(kind) or (
                 row.newest if row else replace(event, kind=kind, message="counted", details={})
             )
             if row is None:
-                first_s = next((one.time_s for one in each_event(event) if one.kind == kind), newest.time_s)
+                first_s = next((each.time_s for each in each_event(event) if each.kind == kind), newest.time_s)
                 row = of[group[0], kind] = EventRow(newest, 0, first_s, newest.time_s)
                 rows.append(row)
             fields = {name: event.details[name] for name in ("group", "count") if name in event.details}

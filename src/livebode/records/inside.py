@@ -77,10 +77,10 @@ def check_own(run: Path, name: str) -> None:
     """RecordError if a file to be written is a link, not a regular file, or has another hard link."""
     check_folder(run, name)
     try:
-        found = os.lstat(run / name)
+        status = os.lstat(run / name)
     except FileNotFoundError:
         return
-    if not stat.S_ISREG(found.st_mode) or found.st_nlink > 1:
+    if not stat.S_ISREG(status.st_mode) or status.st_nlink > 1:
         raise _not_regular(run / name)
 
 

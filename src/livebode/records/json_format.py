@@ -29,29 +29,27 @@ def _plain(value: Any) -> Any:
     return value
 
 
-VERSIONS = {"run": 2, "manifest": 2, "journal": 1, "references": 1, "notes": 1, "loop check": 1}
-"""Newest readable versions: layout of a run directory, manifest.jsonl, journal, references.json, notes.json and
-loop-check.json."""
+VERSIONS = {"run": 3, "manifest": 3, "journal": 1, "references": 1, "notes": 1, "loop check": 1}
+"""Versions that are written and read: layout of a run directory, manifest.jsonl, journal, references.json, notes.json
+and loop-check.json."""
 
 
-def format_of(name: str, version: int | None = None) -> dict[str, Any]:
-    """What a file of this format begins with, by default of the newest version.
+def format_of(name: str) -> dict[str, Any]:
+    """What a file of this format begins with.
 
     >>> format_of("manifest")
-    {'format': 'livebode manifest', 'version': 2}
+    {'format': 'livebode manifest', 'version': 3}
     """
-    return {"format": f"livebode {name}", "version": version or VERSIONS[name]}
+    return {"format": f"livebode {name}", "version": VERSIONS[name]}
 
 
-def check_version(path: Path, name: str, found: Any) -> None:
-    """RecordError if this file is of a newer version than this livebode reads."""
-    if type(found) is int and found > VERSIONS[name]:
-        raise RecordError(
-            "newer-version",
-            f"{str(path)!r} has version {found} of its format, and this livebode reads up to version {VERSIONS[name]}",
-            "update livebode",
-            path=str(path),
-            format=name,
-            found=found,
-            readable=VERSIONS[name],
-        )
+def check_version(path: Path, name: str, version: Any) -> None:
+    """RecordError if this file has another version of its format than the one that this livebode reads."""
+    readable = VERSIONS[name]
+    if type(version) is not int or version == readable:
+        return
+    message = f"{str(path)!r} has version {version} of its format, and this livebode reads version {readable}"
+    facts = {"path": str(path), "format": name, "found": version, "readable": readable}
+    if version > readable:
+        raise RecordError("newer-version", message, "update livebode", **facts)
+    raise RecordError("older-version", message, "run the recording again", **facts)

@@ -1,4 +1,4 @@
-"""loop-check.json: the result of the newest `livebode check-loop` of a run, beside its data."""
+"""loop-check.json: the result of the newest `livebode validate --loop` of a run, beside its data."""
 
 from __future__ import annotations
 
@@ -41,9 +41,9 @@ def read_loop_check(run: Path) -> dict[str, Any] | None:
     return found
 
 
-def write_loop_check(run: Path, found: dict[str, Any]) -> Path:
+def write_loop_check(run: Path, result: dict[str, Any]) -> Path:
     """Replace the result, as a whole; RecordError if that is not possible."""
     check_own(run, NAME)
     with writing(run / NAME, RecordError):
-        write_whole(run / NAME, to_json(format_of("loop check") | found, indent=2).encode())
+        write_whole(run / NAME, to_json(format_of("loop check") | result, indent=2).encode())
     return run / NAME

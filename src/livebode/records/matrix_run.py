@@ -18,16 +18,16 @@ def is_matrix(summary: Mapping[str, Any]) -> bool:
 
 def matrix_shape(summary: Mapping[str, Any], lines: Lines) -> MatrixShape:
     """Signals and lines of a matrix run."""
-    found = summary["found"]
-    return MatrixShape(lines, tuple(found["outputs"]), tuple(found["inputs"]))
+    findings = summary["found"]
+    return MatrixShape(lines, tuple(findings["outputs"]), tuple(findings["inputs"]))
 
 
 def entries_of(summary: Mapping[str, Any]) -> dict[str, tuple[str, str]]:
     """Output and input of each entry, by its name "output/input"; none of an ordinary run."""
     if not is_matrix(summary):
         return {}
-    found = summary["found"]
-    return {f"{o}/{i}": (o, i) for o in found["outputs"] for i in found["inputs"]}
+    findings = summary["found"]
+    return {f"{o}/{i}": (o, i) for o in findings["outputs"] for i in findings["inputs"]}
 
 
 def entry_named(path: str, summary: Mapping[str, Any], name: str) -> tuple[str, str]:
@@ -82,10 +82,10 @@ def matrix_unsupported(
 
 def entry_summary(summary: Mapping[str, Any], output: str, input: str) -> dict[str, Any]:
     """run.json as that of a run with one output and one input."""
-    found = dict(summary["found"])
-    o, i = found["outputs"].index(output), found["inputs"].index(input)
-    own = {"unit": found["units"][o][i], "kinds": found["kinds_of_entries"][o][i]}
-    found = {name: value for name, value in found.items() if name not in _OF_THE_MATRIX} | own
+    findings = dict(summary["found"])
+    o, i = findings["outputs"].index(output), findings["inputs"].index(input)
+    own = {"unit": findings["units"][o][i], "kinds": findings["kinds_of_entries"][o][i]}
+    findings = {name: value for name, value in findings.items() if name not in _OF_THE_MATRIX} | own
     configuration = dict(summary.get("configuration", {}))
     signals = dict(configuration.get("signals", {}))
     signals.pop("excitation", None)  # all of them belong to every entry
@@ -94,14 +94,14 @@ def entry_summary(summary: Mapping[str, Any], output: str, input: str) -> dict[s
     if monitoring is not None:  # one response describes no gantry
         configuration["monitoring"] = {name: value for name, value in monitoring.items() if name != "gantry"}
     configuration["loop"] = _loop(configuration.get("loop") or {}, output, input)
-    rest = {name: value for name, value in summary.items() if name not in ("matrix", "columns")}
-    return rest | {"configuration": configuration, "found": found, "entry": f"{output}/{input}"}
+    others = {name: value for name, value in summary.items() if name not in ("matrix", "columns")}
+    return others | {"configuration": configuration, "found": findings, "entry": f"{output}/{input}"}
 
 
 def _loop(section: Mapping[str, Any], output: str, input: str) -> dict[str, Any]:
     """[loop] with the controller from this output to this input, if it is described."""
-    found = {name: value for name, value in section.items() if name != "controllers"}
+    loop = {name: value for name, value in section.items() if name != "controllers"}
     for controller in section.get("controllers") or []:
         if (controller["output"], controller["input"]) == (output, input):
-            found |= {name: value for name, value in controller.items() if name not in ("output", "input")}
-    return found
+            loop |= {name: value for name, value in controller.items() if name not in ("output", "input")}
+    return loop

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from livebode.arrays import Complex
 from livebode.core import REASONS, Lines, MatrixResponses
 from livebode.records import response_table
-from livebode.records.table_file import ColumnTable
+from livebode.records.column_table import ColumnTable
 from livebode.tables import Field, Schema, Table, Text
 
 SCHEMA = Schema(
@@ -108,9 +108,9 @@ def entry_rows(
     table: Table, output: str, input: str, columns: Sequence[str] = tuple(response_table.RESPONSE_SCHEMA.names)
 ) -> Table:
     """The rows of one entry, with the columns of any run."""
-    at = table.text("output").where(output) & table.text("input").where(input)
+    chosen = table.text("output").where(output) & table.text("input").where(input)
     plain = table.select(list(columns))
-    return Table(plain.schema, tuple(column[np.flatnonzero(at)] for column in plain.columns))
+    return Table(plain.schema, tuple(column[np.flatnonzero(chosen)] for column in plain.columns))
 
 
 def matrices(responses: Iterable[Table], covariance: Iterable[Table], shape: MatrixShape) -> Iterator[MatrixResponses]:
@@ -138,15 +138,15 @@ class _Factors:
             if table is None:
                 break
             self._append(table)
-        found = np.full((len(sample), *self._value.shape[1:]), complex(np.nan, np.nan))
-        at = np.searchsorted(self._sample, sample)
-        known = np.flatnonzero(at < len(self._sample))
-        known = known[self._sample[at[known]] == sample[known]]
-        found[known] = self._value[at[known]]
+        factors = np.full((len(sample), *self._value.shape[1:]), complex(np.nan, np.nan))
+        places = np.searchsorted(self._sample, sample)
+        known = np.flatnonzero(places < len(self._sample))
+        known = known[self._sample[places[known]] == sample[known]]
+        factors[known] = self._value[places[known]]
         if len(sample):
             after = int(np.searchsorted(self._sample, sample[-1], side="right"))
             self._sample, self._value = self._sample[after:], self._value[after:]
-        noise, spread = np.split(found, [len(self._shape.outputs) ** 2], axis=2)
+        noise, spread = np.split(factors, [len(self._shape.outputs) ** 2], axis=2)
         sizes = (len(self._shape.outputs), len(self._shape.inputs))
         rows = (len(sample), len(self._shape.lines))
         return noise.reshape(*rows, sizes[0], sizes[0]), spread.reshape(*rows, sizes[1], sizes[1])

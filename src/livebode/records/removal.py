@@ -33,14 +33,14 @@ _FOLDERS = {
 
 def foreign(run: Path) -> list[str]:
     """Entries in the directory of a run that livebode did not write: other names, links, pipes, devices."""
-    found = []
+    names = []
     for path in sorted(run.iterdir()):
         inner = _FOLDERS.get(path.name)
         if inner is None or not is_folder(path):
-            found += [] if _FILES.fullmatch(path.name) and _regular(path) else [path.name]
+            names += [] if _FILES.fullmatch(path.name) and _regular(path) else [path.name]
         else:
-            found += [f"{path.name}/{p.name}" for p in sorted(path.iterdir()) if not _written(p, inner)]
-    return found
+            names += [f"{path.name}/{p.name}" for p in sorted(path.iterdir()) if not _written(p, inner)]
+    return names
 
 
 def check_removable(path: Path) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from livebode.core import PER_LINE, PER_RESPONSE, Lines, Parameters, Responses
-from livebode.records.table_file import ColumnTable
+from livebode.records.column_table import ColumnTable
 from livebode.tables import Column, Schema, Table, Text
 
 RESPONSE_SCHEMA = Schema.of(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import os
 import warnings
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import suppress
@@ -26,7 +25,6 @@ from livebode.core import (
     Responses,
     RunClock,
 )
-from livebode.language import Message
 from livebode.locations import original
 from livebode.records.grouped_events import still_waiting
 from livebode.records.matrix_run import (
@@ -39,28 +37,18 @@ from livebode.records.matrix_run import (
 )
 from livebode.records.matrix_table import COVARIANCE_SCHEMA, MatrixShape, entry_rows, matrices
 from livebode.records.matrix_table import SCHEMA as MATRIX_SCHEMA
-from livebode.records.piece import StoredTable
 from livebode.records.response_table import EARLIER, RESPONSE_SCHEMA, responses_in
 from livebode.records.segments import event_lines, reading
 from livebode.records.segments.damage import KIND
 from livebode.records.segments.json_lines import EVENTS
 from livebode.records.segments.manifest import NAME as MANIFEST
-from livebode.records.segments.manifest import Manifest, Segment
+from livebode.records.segments.manifest import Segment
 from livebode.records.summary_file import COPY, RUN, copy_damage, read_summary
 from livebode.records.summary_shape import what_is_wrong
 from livebode.tables import Table
 
 _logger = logging.getLogger(__name__)
 _ROWS = 1 << 16  # of responses at once, times their lines: about 10 MB
-
-
-@dataclass(frozen=True)
-class Files:
-    """Location of the rows of a table: Parquet files (of a single one possibly only some row groups), and batches."""
-
-    paths: list[Path]
-    groups: list[int] | None
-    rows: list[Table]
 
 
 def lines_in(found: Mapping[str, Any]) -> Lines:
@@ -229,7 +217,7 @@ class RunRecord:
         """All matrices of a matrix run, as written; no rows before the first. RecordError of another run."""
         shape = self._matrix_shape
         none = matrices([Table.empty(MATRIX_SCHEMA)], [], shape)
-        return MatrixResponses.join(list(self.matrix_batches()) or [self._with_units(one) for one in none])
+        return MatrixResponses.join(list(self.matrix_batches()) or [self._with_units(responses) for responses in none])
 
     def matrix_batches(
         self, size_bytes_max: int | None = None, span_s: tuple[float, float] | None = None
@@ -308,17 +296,17 @@ class RunRecord:
 
     def _whole(self, tables: Iterator[Table], rows: int, columns: Collection[list[str]]) -> Iterator[Table]:
         """The rows of whole responses, `rows` each, in parts of bounded size; RecordError if they are of no run."""
-        rest: Table | None = None
+        remainder: Table | None = None
         for part in tables:
             self._check_columns(part, columns)
             for start in range(0, part.num_rows, _ROWS):
                 piece = part.slice(start, _ROWS)
-                table = piece if rest is None else Table.join([rest, piece])
+                table = piece if remainder is None else Table.join([remainder, piece])
                 whole = table.num_rows // rows * rows
-                rest = table.slice(whole)
+                remainder = table.slice(whole)
                 if whole:
                     yield table.slice(0, whole)
-        if rest is not None and rest.num_rows:
+        if remainder is not None and remainder.num_rows:
             raise RecordError(
                 "unexpected-content",
                 f"the record in {str(self.path)!r} ends within a response",
@@ -362,25 +350,13 @@ class RunRecord:
     ) -> Iterator[Table]:
         file = self.path / name
         try:
-            if reading.in_segments(self.path):
-                yield from reading.tables(
-                    self.path, name, self.report, size_bytes_max, span_s, manifest_bytes=self._manifest_bytes
-                )
-            elif (piece := self._piece(name)) is not None:
-                yield from piece.tables(_ROWS)
+            yield from reading.tables(
+                self.path, name, self.report, size_bytes_max, span_s, manifest_bytes=self._manifest_bytes
+            )
         except LivebodeError:  # it is a ValueError
             raise
         except (OSError, ValueError, KeyError, TypeError) as error:
             raise _unreadable(file, error) from None
-
-    def _piece(self, name: str) -> StoredTable | None:
-        """A table in one file; None if it was not recorded, or if the file is missing, which is reported."""
-        file, parts = f"{name}.parquet", self.summary.get("files", {})
-        if os.path.lexists(self.path / file):
-            return StoredTable(self.path, file, parts.get(file), self.report)
-        if (name == "responses" and not self.output_only) or file in parts:
-            self.report(Event(KIND, 0, 0.0, Message("{file} is damaged: the file is missing", file=file)))
-        return None
 
     @property
     def _manifest_bytes(self) -> int | None:
@@ -389,33 +365,27 @@ class RunRecord:
 
     @property
     def segments(self) -> list[Segment]:
-        """The existing closed segments, by age; none if the run is not recorded in segments."""
-        return Manifest.read(self.path).segments if reading.in_segments(self.path) else []
-
-    def files(self, tables: Collection[str]) -> dict[str, Files]:
-        """The recorded ones of these tables: the intact Parquet files, and the rows that are not in a file yet."""
+        """The existing closed segments, by age."""
         try:
-            if not reading.in_segments(self.path):
-                groups = {name: piece.groups() for name in tables if (piece := self._piece(name)) is not None}
-                whole = {name: found for name, found in groups.items() if found != []}
-                return {name: Files([self.path / f"{name}.parquet"], found, []) for name, found in whole.items()}
-            segments, rows = reading.parts(self.path, self.report, self._manifest_bytes)
-            found = {name: Files([], None, rows.get(name, [])) for name in tables}
-            for segment in segments:
-                if segment.table in found and reading.whole(self.path, segment, self.report) is not None:
-                    found[segment.table].paths.append(self.path / segment.name)
+            manifest = reading.read_manifest(self.path, self.report)
         except OSError as error:
             raise _unreadable(self.path, error) from None
-        return {name: files for name, files in found.items() if files.paths or files.rows}
+        return [] if manifest is None else manifest.segments
 
-    def parts(self) -> tuple[list[Segment], reading.Rows] | None:
-        """The closed segments of all tables, by age, and later rows of each; None of a run in one piece."""
+    def parts(self) -> tuple[list[Segment], reading.Rows]:
+        """The closed segments of all tables, by age, and later rows of each."""
         try:
-            if reading.in_segments(self.path):
-                return reading.parts(self.path, self.report, self._manifest_bytes)
+            return reading.parts(self.path, self.report, self._manifest_bytes)
         except OSError as error:
             raise _unreadable(self.path, error) from None
-        return None
+
+    def check(self, tables: Collection[str]) -> int:
+        """Compare the files of these tables with their checksums; number of the intact rows. Damage is reported."""
+        segments, rows = self.parts()
+        closed = sum(
+            reading.check_segment(self.path, segment, self.report) for segment in segments if segment.table in tables
+        )
+        return closed + sum(batch.num_rows for table in tables for batch in rows.get(table, ()))
 
     def events(self) -> list[Event]:
         """Recorded events; each damaged line is replaced by an event of kind "record-damaged".
@@ -432,8 +402,7 @@ class RunRecord:
     def event_lines(self) -> tuple[Iterator[Event], list[Event]]:
         """Events in events.jsonl, and those of the newest commit that will share a line of it."""
         # The commit before the lines: events written in between are then in both instead of in neither.
-        unfinished = not self.finished and reading.in_segments(self.path)
-        commit = reading.newest_commit(self.path) if unfinished else None
+        commit = None if self.finished else reading.newest_commit(self.path)
         if commit is None:
             return self._event_lines(self.summary.get("size_bytes", {}).get(EVENTS, 0)), []
         waiting = [event for value in commit.waiting if (event := event_lines.to_event(value)) is not None]

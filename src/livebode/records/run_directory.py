@@ -11,11 +11,14 @@ from typing import Any
 
 from livebode.core import Event, RecordError, whole_directory, writing
 from livebode.records._result_rows import RESPONSE_TABLES, result_rows
+from livebode.records.column_table import ColumnTable
 from livebode.records.removal import check_removable, remove
+from livebode.records.segments import manifest
 from livebode.records.segments.json_lines import EVENTS, to_line
 from livebode.records.segments.lock import Lock
+from livebode.records.segments.manifest import Segment
+from livebode.records.segments.segment_writer import TableFile
 from livebode.records.summary_file import COPY, RUN, to_document
-from livebode.records.table_file import ColumnTable, TableFile
 
 _logger = logging.getLogger(__name__)
 
@@ -25,7 +28,7 @@ class RunDirectory:
 
     Use it as a context manager: leaving it without an exception moves the directory to its place, any exception removes
     what was written. Files, readable with any tool: ``responses.parquet`` (see `RESPONSES`), ``events.jsonl`` (one
-    object a line: kind, sample, time_s, message, details) and ``run.json``.
+    object a line: kind, sample, time_s, message, details), ``manifest.jsonl`` and ``run.json``.
 
     Parameters
     ----------
@@ -88,19 +91,20 @@ class RunDirectory:
             self._events.write(to_line(asdict(event)))
 
     def finish(self, summary: dict[str, Any], draw: Callable[[Path], None]) -> None:
-        """Close the tables, write run.json with their checksums, and let `draw` add pictures to the directory."""
+        """Close the tables, write manifest and run.json, and let `draw` add pictures to the directory."""
         with writing(self.path, RecordError):
-            files = self._close()
-            size_bytes = {EVENTS: (self.partial / EVENTS).stat().st_size}
-            data = to_document(summary | {"files": files, "size_bytes": size_bytes})
+            lines = manifest.first_line() + manifest.closing_line(1, self._close(), None)
+            (self.partial / manifest.NAME).write_bytes(lines)
+            size_bytes = {name: (self.partial / name).stat().st_size for name in (EVENTS, manifest.NAME)}
+            data = to_document(summary | {"size_bytes": size_bytes})
             for name in (RUN, COPY):
                 (self.partial / name).write_bytes(data)
             draw(self.partial)
 
-    def _close(self) -> dict[str, Any]:
-        """Close the files; the parts of the tables, for run.json."""
+    def _close(self) -> list[Segment]:
+        """Close the files; the segments of the tables."""
         self._events.close()
-        return {f"{name}.parquet": self._files[name].close() for name in sorted(self._files)}
+        return [self._files[name].close() for name in sorted(self._files)]
 
     def _check_free(self) -> None:
         if not self.path.exists() and not self.path.is_symlink():

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from livebode.core import Block, Channel
-from livebode.records.table_file import ColumnTable
+from livebode.records.column_table import ColumnTable
 from livebode.tables import Field, Schema, Table
 
 _OWN = ("sample", "time_s")

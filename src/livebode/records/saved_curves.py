@@ -108,12 +108,12 @@ def read_saved(run: Path) -> SavedCurves:
             "unreadable", f"{path!r} cannot be read: {error}", "check its permissions", path=path, reason=str(error)
         ) from None
     try:
-        found = from_document(data)
-        check_version(run / SAVED, "references", found.get("version"))
-        if found.get("format") != format_of("references")["format"]:
+        document = from_document(data)
+        check_version(run / SAVED, "references", document.get("version"))
+        if document.get("format") != format_of("references")["format"]:
             raise ValueError("it does not contain references of livebode")
-        references = tuple(_reference(one) for one in _list(found["references"], REFERENCES_MAX))
-        annotations = tuple(_annotation(one) for one in _list(found["annotations"], ANNOTATIONS_MAX))
+        references = tuple(_reference(plain) for plain in _list(document["references"], REFERENCES_MAX))
+        annotations = tuple(_annotation(plain) for plain in _list(document["annotations"], ANNOTATIONS_MAX))
     except (ValueError, KeyError, TypeError, AttributeError, OverflowError) as error:
         raise RecordError(
             "damaged", f"{path!r} is damaged: {error}", "restore it from a backup", path=path, reason=str(error)
@@ -140,8 +140,8 @@ def change_saved(run: Path, change: Callable[[SavedCurves], SavedCurves]) -> Sav
         )
     saved = change(read_saved(run))
     document = {
-        "references": [_plain(one) for one in saved.references],
-        "annotations": [vars(one) for one in saved.annotations],
+        "references": [_plain(entry) for entry in saved.references],
+        "annotations": [vars(entry) for entry in saved.annotations],
     }
     with writing(run / SAVED, RecordError):
         write_whole(run / SAVED, to_document(document, "references"))
@@ -155,17 +155,17 @@ def _check_count(count: int, most: int, what: str) -> None:
         )
 
 
-def _plain(one: SavedReference) -> dict[str, Any]:
-    response = one.response
+def _plain(reference: SavedReference) -> dict[str, Any]:
+    response = reference.response
     lines = response.lines
-    found: dict[str, Any] = {"id": one.id, "name": one.name, "saved": one.saved}
-    found |= {"quantity": response.quantity, "unit": response.unit}
-    found |= {"bins": list(lines.bins), "window": lines.window, "rate_hz": lines.rate_hz}
-    found |= {name: _written(getattr(response, name)[0].item()) for name in _OF_RESPONSE}
+    plain: dict[str, Any] = {"id": reference.id, "name": reference.name, "saved": reference.saved}
+    plain |= {"quantity": response.quantity, "unit": response.unit}
+    plain |= {"bins": list(lines.bins), "window": lines.window, "rate_hz": lines.rate_hz}
+    plain |= {name: _written(getattr(response, name)[0].item()) for name in _OF_RESPONSE}
     parts = {"re": response.value[0].real, "im": response.value[0].imag}
     parts |= {name: getattr(response, name)[0] for name in _OF_LINE}
-    found |= {name: [_written(v) for v in part.tolist()] for name, part in parts.items()}
-    return found | {"valid": response.valid[0].tolist()}
+    plain |= {name: [_written(v) for v in part.tolist()] for name, part in parts.items()}
+    return plain | {"valid": response.valid[0].tolist()}
 
 
 def _reference(plain: dict[str, Any]) -> SavedReference:
@@ -173,10 +173,10 @@ def _reference(plain: dict[str, Any]) -> SavedReference:
     count = len(lines)
 
     def numbers(name: str) -> Any:
-        found = np.array([_read(v) for v in plain[name]], dtype=np.float64)
-        if found.shape != (count,):
+        values = np.array([_read(v) for v in plain[name]], dtype=np.float64)
+        if values.shape != (count,):
             raise ValueError(f"{name} does not have {count} values")
-        return found
+        return values
 
     rows: dict[str, Any] = {name: np.array([_read(plain[name])]) for name in ("time_s", "schedule", "dof")}
     rows |= {name: np.array([int(plain[name])], dtype=np.int64) for name in ("first", "sample")}
@@ -217,7 +217,7 @@ def _id(plain: dict[str, Any]) -> str:
     return str(plain["id"])
 
 
-def _list(found: list[T], most: int) -> list[T]:
-    if not isinstance(found, list) or len(found) > most:
+def _list(entries: list[T], most: int) -> list[T]:
+    if not isinstance(entries, list) or len(entries) > most:
         raise ValueError(f"there are more than {most} entries, or no list of them")
-    return found
+    return entries

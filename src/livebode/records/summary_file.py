@@ -26,14 +26,12 @@ def to_document(summary: dict[str, Any], name: str = "run") -> bytes:
     >>> print(to_document({"found": {}}).decode(), end="")
     {
       "format": "livebode run",
-      "version": 1,
+      "version": 3,
       "found": {},
-      "crc32": "d477367d"
+      "crc32": "d1a35dfe"
     }
     """
-    # Earlier versions of livebode read every run but a matrix run.
-    version = 1 if name == "run" and not summary.get("matrix") else None
-    text = to_json(format_of(name, version) | summary, indent=2)
+    text = to_json(format_of(name) | summary, indent=2)
     return f'{text[:-2]},\n  "crc32": "{zlib.crc32(text.encode()):08x}"\n}}\n'.encode()
 
 
@@ -43,7 +41,7 @@ def from_document(data: bytes) -> dict[str, Any]:
     Null values are treated as missing.
 
     >>> from_document(to_document({"found": {"rate_hz": 1000}}))
-    {'format': 'livebode run', 'version': 1, 'found': {'rate_hz': 1000}}
+    {'format': 'livebode run', 'version': 3, 'found': {'rate_hz': 1000}}
     >>> from_document(to_document({"found": {"rate_hz": 1000}}).replace(b"1000", b"1001"))
     Traceback (most recent call last):
     ValueError: its checksum is wrong
@@ -70,7 +68,7 @@ def read_summary(run: Path) -> tuple[dict[str, Any], str]:
     Raises
     ------
     RecordError
-        If neither can be read, this is not the directory of a run, or a newer livebode wrote it.
+        If neither can be read, this is not the directory of a run, or another version of livebode wrote it.
     """
     try:
         return _read(run, RUN), ""

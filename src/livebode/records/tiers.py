@@ -66,12 +66,13 @@ class Thinning:
         """The rows of all entries, in order of time: lines within an entry, entries within a mean."""
         lines, rows = len(self._lines), means[0].num_rows // len(self._lines)
         columns: list[Any] = [
-            np.stack([one[name].reshape(rows, lines) for one in means], axis=1).ravel() for name in TIER_SCHEMA.names
+            np.stack([entry[name].reshape(rows, lines) for entry in means], axis=1).ravel()
+            for name in TIER_SCHEMA.names
         ]
         for side in (0, 1):
             words = list(dict.fromkeys(names[side] for names in self._entries))
-            at = np.repeat([words.index(names[side]) for names in self._entries], lines)
-            columns.append(Text.of(words, np.tile(at, rows)))
+            codes = np.repeat([words.index(names[side]) for names in self._entries], lines)
+            columns.append(Text.of(words, np.tile(codes, rows)))
         return Table(MATRIX_TIER_SCHEMA, tuple(columns))
 
 
@@ -81,21 +82,20 @@ def thinned(run: RunRecord, bin_s: float, span_s: tuple[float, float] | None = N
     Responses from before the run had tiers, and those that are not in a segment yet, are averaged when they are read.
     Of a matrix run `run` is the view of an entry.
     """
-    parts = run.parts()
     tables = [table for table, each_s in BIN_S.items() if each_s <= bin_s]
-    if parts is None or not tables:
+    if not tables:
         return None
-    segments, rows = parts
+    segments, rows = run.parts()
     tier = [segment for segment in segments if segment.table == tables[-1]]
     if not tier:
         return None
     begin = min(segment.first_sample for segment in tier)
-    before = [one for one in segments if one.table == "responses" and one.last_sample < begin]
+    before = [segment for segment in segments if segment.table == "responses" and segment.last_sample < begin]
     means: list[BinnedMeans] = []
-    for segment in [one for one in (*before, *tier) if _within(one, span_s)]:
-        if (file := reading.whole(run.path, segment, run.report)) is not None:
-            each_s = None if segment.table in BIN_S else bin_s
-            means.append(_means_of(run, file.table(), each_s))
+    for segment in [segment for segment in (*before, *tier) if _within(segment, span_s)]:
+        each_s = None if segment.table in BIN_S else bin_s
+        if groups := list(reading.segment_rows(run.path, segment, run.report)):
+            means.append(_means_of(run, Table.join(groups), each_s))
     if "responses" in rows:
         means.append(_means_of(run, Table.join(rows["responses"]), bin_s))
     if not means:

@@ -18,7 +18,7 @@ from livebode.runtime.summary import provenance
 def run(axis: Axis, to: Destination, control: RunControl | None = None) -> Outcome:
     """Track a recording or several, or a machine while it works, and write a run directory.
 
-    A recording is written in one piece, or in segments if the axis has a [record]. A live source is always recorded in
+    A recording is written at once, or with a journal if the axis has a [record]. A live source is always recorded in
     segments, and ends with its sender or when `control` requests it; all received samples are then recorded. The same
     axis in the same directory continues an unfinished run: a live source with the sender's next sample, where missing
     samples are a gap whose length follows from the sender's numbers. A change of the configuration by `control`
@@ -29,7 +29,7 @@ def run(axis: Axis, to: Destination, control: RunControl | None = None) -> Outco
     ------
     LivebodeError
         For any error in the recording or the configuration, if the machine rejects the connection, or if the run is
-        stopped before samples arrive. In one piece nothing is written; in segments what was recorded so far remains.
+        stopped before samples arrive. At once nothing is written; with a journal what was recorded so far remains.
     StoppedError
         If `control` ends a recording before its end; the directory is as for an error.
     """

@@ -65,11 +65,6 @@ class RunContext:
         """Source of the samples."""
         return self.feed.source
 
-    @property
-    def shedding(self) -> LoadShedding | None:
-        """What it has time for; None of a recording."""
-        return self.feed.shedding
-
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
@@ -148,6 +143,10 @@ class Estimate(ABC):
         Detects changes, or reports that it cannot.
     run
         Its run, as soon as it has one.
+    events
+        Receives events of the samples that are processed: of its run, or of who processes without one.
+    shedding
+        What a live run has time for.
     """
 
     tables: ClassVar[Mapping[str, ColumnTable]]
@@ -159,6 +158,8 @@ class Estimate(ABC):
     readiness: Readiness | None
     detection: BaselineComparison[Any] | None
     run: RunContext
+    events: list[Event]
+    shedding: LoadShedding | None = None
 
     @classmethod
     def live(cls, axis: Axis, source: LiveSource) -> Self:
@@ -218,7 +219,7 @@ class Estimate(ABC):
 
     def begin(self, run: RunContext) -> None:
         """The run begins."""
-        self.run = run
+        self.run, self.events, self.shedding = run, run.events, run.feed.shedding
 
     def take_over(self, before: Estimate) -> bool:  # noqa: ARG002 - for kinds with live sources
         """Continue with the state of the previous one, if the settings that it depends on are unchanged.

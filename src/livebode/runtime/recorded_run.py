@@ -24,7 +24,7 @@ from livebode.sources.live import (
     make_source,
     with_kinds,
 )
-from livebode.tables import Table, read_footer
+from livebode.tables import Table
 
 
 class RecordedRun:
@@ -63,12 +63,7 @@ class RecordedRun:
     @cached_property
     def samples(self) -> int:
         """Number of its samples."""
-        files = self._run.files(["samples"])["samples"]
-        closed = 0
-        for path in files.paths:
-            with path.open("rb") as file:
-                closed += read_footer(file).rows
-        return int(closed + sum(batch.num_rows for batch in files.rows))
+        return self._run.check(["samples"])
 
     @property
     def clock(self) -> RunClock:

@@ -1,4 +1,4 @@
-"""Recorder: the record of a run, as the run loop uses it; WholeRecord: one in one piece; Destination: where it goes."""
+"""Recorder: the record of a run, as the run loop uses it; WholeRecord: one that is written at once; Destination."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 class Recorder(Protocol):
-    """The record of a run, in one piece or in segments. Used as a context manager around the run."""
+    """The record of a run, written at once or with a journal. Used as a context manager around the run."""
 
     path: Path
 
@@ -166,8 +166,8 @@ class Destination:
     Parameters
     ----------
     directory
-        Directory of the run. In one piece it appears only when complete; in segments it exists from the beginning,
-        and an unfinished one of the same axis is continued.
+        Directory of the run. Written at once it appears only when complete; with a journal it exists from the
+        beginning, and an unfinished one of the same axis is continued.
     draw
         Called to add pictures: with the estimate, and the directory before it is renamed.
     force

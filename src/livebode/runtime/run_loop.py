@@ -16,11 +16,10 @@ from livebode.preparation import ChannelCheck, check_length
 from livebode.runtime.allocation import keep_freed_memory
 from livebode.runtime.documents import Channels, ClockSet, Document, RunEnded, RunStarted, Subscriber, TrackerResults
 from livebode.runtime.estimate import Estimate, Outcome, RunContext
-from livebode.runtime.event_groups import EventGroups
 from livebode.runtime.feed import Feed
 from livebode.runtime.recorder import Destination, WholeRecord
 from livebode.runtime.run_control import StoppedError
-from livebode.runtime.run_counts import RunCounts
+from livebode.runtime.run_counts import EventGroups, RunCounts
 from livebode.sources.live import KINDS
 
 if TYPE_CHECKING:
@@ -97,7 +96,7 @@ class RunLoop:
     about
         Additional entries of run.json.
     segments
-        Settings of a record in segments; None for a record in one piece.
+        Settings of a record with a journal; None for a record that is written at once.
     """
 
     def __init__(

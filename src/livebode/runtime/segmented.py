@@ -1,4 +1,4 @@
-"""SegmentedRecord: the record of a run in segments, and the states that continue at its end."""
+"""SegmentedRecord: the record of a run with a journal, and the states that continue at its end."""
 
 from __future__ import annotations
 

@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
 def of_drift(drift: Drift, lines: Lines) -> dict[str, Any]:
     """Entries on a drift of the machine within the recording: at the lines where it is significant, or the clearest."""
-    if not drift.found:
+    if not drift.significant:
         return {"found": False, "lines": []}
     shown = drift.lines.copy()
     if not shown.any():
@@ -286,20 +286,21 @@ class SingleResponse(Estimate):
 
     def monitor(self, block: Block) -> Iterator[Event]:
         """Where the machine begins and ends to be ready, before its alarms."""
-        self._ready = [block]
+        ready = [block]
         if self.readiness is not None:
             yield from self.readiness.take(block)
             self.follower.set_aside(self.readiness.spans)
-            self._ready = self.readiness.condition.parts(block)
-        if self.detection is not None and (self.run.shedding is None or self.run.shedding.monitors()):
-            for part in self._ready:
+            ready = self.readiness.condition.parts(block)
+        self._ready = ready if self._checks is not None else []  # no other use needs the samples any longer
+        if self.detection is not None and (self.shedding is None or self.shedding.monitors()):
+            for part in ready:
                 yield from self.detection.take_samples(part)
 
     def process(self, block: Block) -> Responses:
-        return self._marked(self.follower.process(block, self.run.events.append))
+        return self._marked(self.follower.process(block, self.events.append))
 
     def finish(self) -> Responses | None:
-        responses = self.follower.finish(self.run.events.append)
+        responses = self.follower.finish(self.events.append)
         return None if responses is None else self._marked(responses)
 
     def _marked(self, responses: Responses) -> Responses:
@@ -326,14 +327,14 @@ class SingleResponse(Estimate):
             yield FitResults(parts)
             yield from events
             parameters = parts[0]
-        shedding = self.run.shedding
+        shedding = self.shedding
         if self.detection is not None and (shedding is None or shedding.to_monitor(responses)):
             yield from self.detection.take_responses(responses, parameters)
 
     def _fitted(self, fits: Fits, responses: Responses) -> tuple[tuple[Parameters, ...], list[Event]]:
-        if self.run.shedding is None:
+        if self.shedding is None:
             return fits.process(responses)
-        with self.run.shedding.fitting(responses) as chosen:
+        with self.shedding.fitting(responses) as chosen:
             return fits.process(chosen)
 
     def check(self, block: Block) -> Iterable[Event]:

@@ -40,7 +40,7 @@ def extremes(
         (lowest, highest) of `torque` in N m, and of the cart's `speed` in m/s, `travel` (its position) and
         `following error` in m.
     """
-    found: dict[str, tuple[float, float]] = {}
+    ranges: dict[str, tuple[float, float]] = {}
     for shift in np.arange(alignments) * len(samples) // alignments:
         run = replace(axis, excitation_n_m=np.roll(samples, shift), run_in_s=run_in_s, seconds=seconds)
         block, truth = SimulatedAxis(run).run()
@@ -52,6 +52,6 @@ def extremes(
             "following error": (block["position_reference"] - truth.states[0]) * radius,
         }
         for name, x in observed.items():
-            low, high = found.get(name, (np.inf, -np.inf))
-            found[name] = (min(low, float(x.min())), max(high, float(x.max())))
-    return found
+            low, high = ranges.get(name, (np.inf, -np.inf))
+            ranges[name] = (min(low, float(x.min())), max(high, float(x.max())))
+    return ranges

@@ -141,9 +141,9 @@ def _three_masses(mechanics: Mechanics, spans: Spans, load_kg: float) -> tuple[F
     return stiffness, damping, 1 / masses
 
 
-def _resolvent(a: Floats, b: Floats, c: Floats, at: Complex) -> Complex:
+def _resolvent(a: Floats, b: Floats, c: Floats, argument: Complex) -> Complex:
     """c·(at·I − A)⁻¹·b at each point, the shape of `at`."""
-    points = np.atleast_1d(at)
+    points = np.atleast_1d(argument)
     shifted = points[..., None, None] * np.eye(len(b)) - a
     solved = np.linalg.solve(shifted, np.broadcast_to(b[:, None], (*points.shape, len(b), 1)))
-    return np.asarray((solved[..., 0] @ c).reshape(np.shape(at)))
+    return np.asarray((solved[..., 0] @ c).reshape(np.shape(argument)))

@@ -12,7 +12,7 @@ from livebode.core import PID, Cascade, Loop, UsageError
 from livebode.simulation.values import NonNegative, Positive, count, nonnegative, positive
 
 DELAY_TICKS_MAX = 64
-_COUNTS_MAX = 1 << 32
+_COUNTS_MAX = 1 << 32  # in double precision, positions in counts are exact over 2²¹ turns
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -50,8 +50,8 @@ class ClosedLoop:
         DFT at the line.
         """
         f = np.asarray(frequency_hz, dtype=np.float64)
-        found = np.array([self._at(z) for z in np.exp(2j * np.pi * f.ravel() / self.drive.rate_hz)])
-        y, u = found.reshape(-1, 2).T
+        pairs = np.array([self._at(z) for z in np.exp(2j * np.pi * f.ravel() / self.drive.rate_hz)])
+        y, u = pairs.reshape(-1, 2).T
         return y.reshape(f.shape), u.reshape(f.shape)
 
     @property
@@ -84,11 +84,11 @@ class ClosedLoop:
     def _ticks(self) -> list[tuple[Floats, Floats, Floats]]:
         """For each tick of a repetition: state to state, w to state, and (y, u) from (state, w)."""
         unit = np.eye(self._size + 1)  # columns: one for each state alone, the last for w alone
-        found = []
+        ticks = []
         for n in range(self.drive.position_ticks):
             state, rows = self._tick(unit[:-1], unit[-1], n)
-            found.append((state[:, :-1], state[:, -1], rows))
-        return found
+            ticks.append((state[:, :-1], state[:, -1], rows))
+        return ticks
 
     def _tick(self, state: Floats, w: Floats, n: int) -> tuple[Floats, Floats]:
         """One tick of many states at once, shape (size, columns)."""

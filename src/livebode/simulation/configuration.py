@@ -245,8 +245,8 @@ class BeltAxis:
 
     def weakening(self, position_m: Floats) -> Floats:
         """Factor of the soft spots on the stiffness with the cart at these positions."""
-        at = self.mechanics.effective(position_m)
-        return np.asarray(np.prod([spot.factor(at) for spot in self.spots], axis=0) * np.ones(np.shape(at)))
+        cart_m = self.mechanics.effective(position_m)
+        return np.asarray(np.prod([spot.factor(cart_m) for spot in self.spots], axis=0) * np.ones(np.shape(cart_m)))
 
     def spans(self, position_m: float, time_s: float = 0.0) -> Spans:
         """The belt with the cart at `position_m`, under the faults of that time."""
@@ -260,7 +260,7 @@ class BeltAxis:
         return linear(self.mechanics, self.friction, self.spans(position_m, time_s), load_kg)
 
     def closed_loop(self, position_m: float, time_s: float = 0.0) -> ClosedLoop:
-        """That linearisation in the drive's loop: Y/W, U/W."""
+        """Linearisation in the drive's loop: Y/W, U/W."""
         return ClosedLoop(self.linear(position_m, time_s), self.drive, self.sensor)
 
 

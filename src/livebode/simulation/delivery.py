@@ -1,4 +1,4 @@
-"""Common parts of simulated sources: channels, the excitation, and delivery of Blocks, in real time if required."""
+"""Common parts of simulated sources: channels, excitation, delivery of Blocks, in real time if required, divergence."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Block, Channel, SignalError, UsageError, nearest_name
+from livebode.core import Block, Channel, SignalError, SimulationError, UsageError, nearest_name
 
 CHANNELS = (
     Channel("w", "N m"),
@@ -71,3 +71,16 @@ def paced(blocks: Iterable[Block], clock: Callable[[], float], sleep: Callable[[
         if (wait := began + block.stop / block.rate_hz - clock()) > 0:
             sleep(wait)
         yield block
+
+
+def diverged(time_s: float, state: Sequence[float], why: str) -> SimulationError:
+    """The error for a simulated machine with this state at this time."""
+    values = [float(value) for value in state]
+    numbers = ", ".join(f"{value:.6g}" for value in values)
+    return SimulationError(
+        "diverged",
+        f"the simulation stopped at {time_s:.6f} s, where {why} ({numbers})",
+        "lower the gains, the delay or the amplitude",
+        time_s=time_s,
+        state=values,
+    )

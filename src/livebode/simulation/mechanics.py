@@ -100,14 +100,14 @@ class Mechanics:
                 high=1,
             )
         for name in ("nominal_position_m", "frozen_position_m"):
-            at = getattr(self, name)
-            if at is not None and not 0 < at < self.pulley_distance_m:
+            start_m = getattr(self, name)
+            if start_m is not None and not 0 < start_m < self.pulley_distance_m:
                 raise UsageError(
                     "out-of-range",
-                    f"{name}={at} is not between the pulleys",
+                    f"{name}={start_m} is not between the pulleys",
                     f"choose from 0 to {self.pulley_distance_m} m",
                     argument=name,
-                    value=at,
+                    value=start_m,
                     low=0,
                     high=self.pulley_distance_m,
                 )
@@ -150,8 +150,8 @@ class Mechanics:
         return given if self.frozen_position_m is None else np.full_like(given, self.frozen_position_m)
 
     def _shape(self, position_m: ArrayLike) -> Floats:
-        at = np.asarray(position_m, dtype=np.float64)
-        return np.asarray(1 / at + 1 / (2 * self.pulley_distance_m - at))
+        cart_m = np.asarray(position_m, dtype=np.float64)
+        return np.asarray(1 / cart_m + 1 / (2 * self.pulley_distance_m - cart_m))
 
 
 @dataclass(frozen=True)
@@ -173,13 +173,13 @@ class Spans:
         cls, mechanics: Mechanics, position_m: float, stiffness_factor: float = 1.0, damping_factor: float = 1.0
     ) -> Spans:
         """The spans with the cart at `position_m`, all with the same factors on stiffness and damping."""
-        at = float(mechanics.effective(position_m))
-        lengths = at, mechanics.pulley_distance_m - at, mechanics.pulley_distance_m
-        shape = 1 / at + 1 / (lengths[1] + lengths[2])
+        cart_m = float(mechanics.effective(position_m))
+        lengths = cart_m, mechanics.pulley_distance_m - cart_m, mechanics.pulley_distance_m
+        shape = 1 / cart_m + 1 / (lengths[1] + lengths[2])
         c = mechanics.specific_stiffness_n * stiffness_factor
         b = mechanics.damping_shape * damping_factor / sqrt(shape)
-        one, two, three = (1 / length for length in lengths)
-        return cls((c * one, c * two, c * three), (b * one, b * two, b * three))
+        first, second, third = (1 / length for length in lengths)
+        return cls((c * first, c * second, c * third), (b * first, b * second, b * third))
 
     @property
     def stiffness_n_per_m(self) -> float:
@@ -193,5 +193,5 @@ class Spans:
 
 
 def _joined(span: tuple[float, float, float]) -> float:
-    one, two, three = span
-    return one + (two * three / (two + three) if two + three > 0 else 0.0)
+    first, second, third = span
+    return first + (second * third / (second + third) if second + third > 0 else 0.0)

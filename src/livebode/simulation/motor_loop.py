@@ -172,8 +172,8 @@ class MotorLoop(ABC):
         motors = self.mechanism.motors
         inputs = np.zeros((2 * motors + len(self.mechanism.outputs), excitation.shape[1]))
         inputs[:motors] = excitation
-        for at, given in ((slice(motors, 2 * motors), disturbance), (slice(2 * motors, None), noise)):
-            inputs[at] = 0.0 if given is None else given
+        for rows, given in ((slice(motors, 2 * motors), disturbance), (slice(2 * motors, None), noise)):
+            inputs[rows] = 0.0 if given is None else given
         return inputs
 
     def _observed(self, inputs: Floats, state: Floats, rows: Floats) -> tuple[Floats, Floats]:
@@ -182,9 +182,9 @@ class MotorLoop(ABC):
         samples = inputs.shape[1]
         whole = samples - samples % _TOGETHER
         parts = []
-        for at, ticks in ((slice(0, whole), _TOGETHER), (slice(whole, samples), samples - whole)):
-            if inputs[:, at].shape[1]:
-                seen, state = _advanced(inputs[:, at], state, rows, forward, entry, ticks)
+        for span, ticks in ((slice(0, whole), _TOGETHER), (slice(whole, samples), samples - whole)):
+            if inputs[:, span].shape[1]:
+                seen, state = _advanced(inputs[:, span], state, rows, forward, entry, ticks)
                 parts.append(seen)
         return np.concatenate(parts, axis=1) if parts else np.zeros((len(rows), *inputs.shape[1:])), state
 

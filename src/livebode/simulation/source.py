@@ -13,8 +13,7 @@ from livebode.arrays import Floats
 from livebode.core import Block, Channel, UsageError
 from livebode.simulation._axis import Engine
 from livebode.simulation.configuration import BeltAxis, engine_settings
-from livebode.simulation.delivery import CHANNELS, checked_block_samples, delivered, excitation_at
-from livebode.simulation.divergence import diverged
+from livebode.simulation.delivery import CHANNELS, checked_block_samples, delivered, diverged, excitation_at
 from livebode.simulation.faults import Condition
 from livebode.simulation.truth import Truth
 

@@ -39,8 +39,8 @@ def to_arrow_stream(table: Table) -> Any:
     """The table as one batch of a stream of nanoarrow."""
     schema = schema_to_arrow(table.schema)
     children = [
-        na.c_array_from_buffers(schema.child(at), len(column), [data or None for data in buffers_of(column)], 0)
-        for at, column in enumerate(table.columns)
+        na.c_array_from_buffers(schema.child(index), len(column), [data or None for data in buffers_of(column)], 0)
+        for index, column in enumerate(table.columns)
     ]
     batch = na.c_array_from_buffers(schema, table.num_rows, [None], 0, children=children)
     return na.c_array_stream(batch)
@@ -49,19 +49,22 @@ def to_arrow_stream(table: Table) -> Any:
 def from_arrow(data: Any) -> Table:
     """See `Table.from_arrow`."""
     with na.c_array_stream(data) as stream:
-        found = stream.get_schema()
-        if found.format != "+s":
-            raise TypeError(f"the data are of type {found.format!r} of Arrow, not a table")
-        columns = list(found.children)
+        schema = stream.get_schema()
+        if schema.format != "+s":
+            raise TypeError(f"the data are of type {schema.format!r} of Arrow, not a table")
+        columns = list(schema.children)
         kinds = [kind_of(column) for column in columns]
         batches = list(stream)
-    parts = [[_values(one.child(at), kind, one.offset, one.length) for one in batches] for at, kind in enumerate(kinds)]
+    parts = [
+        [_values(batch.child(index), kind, batch.offset, batch.length) for batch in batches]
+        for index, kind in enumerate(kinds)
+    ]
     joined = tuple(_joined(part, kind) for part, kind in zip(parts, kinds))
     fields = tuple(  # integers with nulls are doubles now
         Field(column.name, STRING if isinstance(values, Text) else values.dtype.name, _texts(column.metadata))
         for column, values in zip(columns, joined)
     )
-    return Table(Schema(fields, _texts(found.metadata)), joined)
+    return Table(Schema(fields, _texts(schema.metadata)), joined)
 
 
 def kind_of(column: Any) -> str:
@@ -105,11 +108,11 @@ def _words(view: Any, rows: slice) -> list[str]:
 def _viewed(view: Any, rows: slice) -> list[str]:
     """Text in views: short words are in them, others in one of several buffers."""
     letters = [bytes(buffer) for buffer in list(view.buffers)[2:]]
-    found = []
-    for one in np.frombuffer(view.buffer(1), "V16")[rows].tolist():
-        size, _, number, begin = _VIEW.unpack(one)
-        found.append((one[4 : 4 + size] if size <= _SHORT else letters[number][begin : begin + size]).decode())
-    return found
+    words = []
+    for word in np.frombuffer(view.buffer(1), "V16")[rows].tolist():
+        size, _, number, begin = _VIEW.unpack(word)
+        words.append((word[4 : 4 + size] if size <= _SHORT else letters[number][begin : begin + size]).decode())
+    return words
 
 
 def _bits(buffer: Any, rows: slice) -> NDArray[np.bool_]:

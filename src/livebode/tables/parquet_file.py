@@ -65,14 +65,14 @@ def joined(parts: Iterator[Column], rows: int) -> Column:
         return Text.join([first, *(part for part in parts if isinstance(part, Text))])
     if len(first) == rows:
         return first
-    found, at = np.empty(rows, first.dtype), len(first)
-    found[:at] = first
+    column, filled = np.empty(rows, first.dtype), len(first)
+    column[:filled] = first
     for part in parts:
-        if isinstance(part, Text) or part.dtype != found.dtype:  # some have nulls, so all are doubles
-            found = found.astype(np.float64)
-        found[at : at + len(part)] = part
-        at += len(part)
-    return found
+        if isinstance(part, Text) or part.dtype != column.dtype:  # some have nulls, so all are doubles
+            column = column.astype(np.float64)
+        column[filled : filled + len(part)] = part
+        filled += len(part)
+    return column
 
 
 class _Pages:
@@ -85,14 +85,14 @@ class _Pages:
         self._words: NDArray[Any] | list[str] | None = None
 
     def __iter__(self) -> Iterator[Column]:
-        at, left = 0, self._chunk.values
+        position, left = 0, self._chunk.values
         while left > 0:
-            header, begin = decode(self._data, at)
+            header, begin = decode(self._data, position)
             kind, stored = header.get(_KIND), header.get(_STORED, -1)
-            at = begin + stored
-            if not begin <= at <= len(self._data):
+            position = begin + stored
+            if not begin <= position <= len(self._data):
                 raise ValueError(f"a page declares {stored} bytes")
-            body = self._data[begin:at]
+            body = self._data[begin:position]
             if _CRC in header and zlib.crc32(body) != header[_CRC] & 0xFFFFFFFF:
                 raise ValueError("the checksum of a page is wrong")
             if kind == DICTIONARY_PAGE:
@@ -130,23 +130,23 @@ class _Pages:
             known = decode_runs(data[4 : 4 + size], 1, values) != 0
             data = data[4 + size :]
         count = values if known is None else int(np.count_nonzero(known))
-        found = self._encoded(about.get(_ENCODING), data, count)
-        return found if known is None or count == values else _spread(found, known)
+        column = self._encoded(about.get(_ENCODING), data, count)
+        return column if known is None or count == values else _spread(column, known)
 
     def _encoded(self, encoding: int | None, data: memoryview, count: int) -> Column:
         if encoding == PLAIN:
-            found = self._plain(data, count)
-            return Text.of(found) if isinstance(found, list) else found
+            plain = self._plain(data, count)
+            return Text.of(plain) if isinstance(plain, list) else plain
         if encoding not in (PLAIN_DICTIONARY, RLE_DICTIONARY):
             raise ForeignFormError(f"a page declares encoding {encoding}")
         if self._words is None:
             raise ValueError(f"a page declares encoding {encoding}, without a dictionary")
-        at = decode_runs(data[1:], data[0] if data else 33, count) if count else np.empty(0, np.uint32)
-        if count and at.max() >= len(self._words):
+        codes = decode_runs(data[1:], data[0] if data else 33, count) if count else np.empty(0, np.uint32)
+        if count and codes.max() >= len(self._words):
             raise ValueError(f"a page has a word that is not among {len(self._words)}")
         if isinstance(self._words, list):
-            return Text.of(self._words, at.astype(np.int32))
-        return self._words[at]
+            return Text.of(self._words, codes.astype(np.int32))
+        return self._words[codes]
 
     def _plain(self, data: memoryview, count: int) -> NDArray[Any] | list[str]:
         if self._kind == STRING:
@@ -180,28 +180,28 @@ class _Pages:
 def _words_of(data: memoryview, count: int) -> list[str]:
     if 4 * count > len(data):
         raise ValueError("a page is cut")
-    words, at, letters = [], 0, bytes(data)
+    words, position, letters = [], 0, bytes(data)
     for _ in range(count):
-        begin = at + 4
-        at = begin + int.from_bytes(letters[at:begin], "little")
-        if at > len(letters):
+        begin = position + 4
+        position = begin + int.from_bytes(letters[position:begin], "little")
+        if position > len(letters):
             raise ValueError("a page is cut")
-        words.append(letters[begin:at].decode())
+        words.append(letters[begin:position].decode())
     return words
 
 
 def _spread(values: Column, known: NDArray[np.bool_]) -> Column:
     """The values in the rows that have one."""
     if isinstance(values, Text):
-        at = np.full(len(known), len(values.words), dtype=np.int32)
-        at[known] = values.at
-        return Text.of([*values.words, ""], at)
+        codes = np.full(len(known), len(values.words), dtype=np.int32)
+        codes[known] = values.at
+        return Text.of([*values.words, ""], codes)
     if values.dtype == np.bool_:
-        found: NDArray[Any] = np.zeros(len(known), dtype=np.bool_)
+        spread: NDArray[Any] = np.zeros(len(known), dtype=np.bool_)
     else:
-        found = np.full(len(known), np.nan, dtype=values.dtype if values.dtype.kind == "f" else np.float64)
-    found[known] = values
-    return found
+        spread = np.full(len(known), np.nan, dtype=values.dtype if values.dtype.kind == "f" else np.float64)
+    spread[known] = values
+    return spread
 
 
 _GROUP_VALUES_MAX = 1 << 27  # 1 GiB of numbers
@@ -260,10 +260,10 @@ class ParquetFile:
                 yield table.slice(begin, rows)
 
     def _named(self, name: str) -> ParquetColumn:
-        found = next((one for one in self.footer.columns if one.name == name), None)
-        if found is None:
+        named = next((column for column in self.footer.columns if column.name == name), None)
+        if named is None:
             raise KeyError(name)
-        return found
+        return named
 
     def _column(self, column: ParquetColumn, groups: Sequence[int]) -> Column:
         filled = [group for group in groups if self.footer.groups[group].rows]
@@ -312,9 +312,9 @@ def _foreign_column(content: bytes | BinaryIO, group: int, name: str, rows: int,
     source = io.BytesIO(content) if isinstance(content, bytes) else content
     try:
         file = pq.ParquetFile(source, page_checksum_verification=True)
-        found = Table.from_arrow(file.read_row_group(group, columns=[name], use_threads=False)).columns
+        columns = Table.from_arrow(file.read_row_group(group, columns=[name], use_threads=False)).columns
     except (pa.ArrowException, OSError, TypeError) as error:
         raise ValueError(f"{form}, and PyArrow does not read it: {str(error).splitlines()[0]}") from None
-    if len(found) != 1 or len(found[0]) != rows:
+    if len(columns) != 1 or len(columns[0]) != rows:
         raise ValueError(f"{form}, and has not one value for each row")
-    return found[0]
+    return columns[0]

@@ -97,24 +97,27 @@ class Footer:
 
     def schema_of(self, columns: Sequence[ParquetColumn]) -> Schema:
         """The schema of a table of these columns, with their metadata; TypeError if one cannot be in a table."""
-        if wrong := [one.name for one in columns if one.kind is None]:
+        if wrong := [column.name for column in columns if column.kind is None]:
             raise TypeError(f"column {wrong[0]!r} is of a type that a table does not have: read it with PyArrow")
-        found = self._arrow_fields()
-        fields = tuple(Field(one.name, one.kind or "", found.get(one.name, {})) for one in columns)
+        metadata = self._arrow_fields()
+        fields = tuple(Field(column.name, column.kind or "", metadata.get(column.name, {})) for column in columns)
         return Schema(fields, {key: value for key, value in self.metadata.items() if key != ARROW_SCHEMA})
 
     def statistics(self, group: int, name: str) -> Statistics:
         """Those of a column in a row group; KeyError if there is no such column."""
-        column = next((one for one in self.columns if one.name == name), None)
+        column = next((each for each in self.columns if each.name == name), None)
         if column is None:
             raise KeyError(name)
-        found = _inner(_inner(self.groups[group].chunks[column.leaf], _ABOUT), _STATISTICS)
-        data = found.get(_MINIMUM, found.get(_OLD_MINIMUM)), found.get(_MAXIMUM, found.get(_OLD_MAXIMUM))
-        low, high = (None if one is None else _number(column, one) for one in data)
+        statistics = _inner(_inner(self.groups[group].chunks[column.leaf], _ABOUT), _STATISTICS)
+        data = (
+            statistics.get(_MINIMUM, statistics.get(_OLD_MINIMUM)),
+            statistics.get(_MAXIMUM, statistics.get(_OLD_MAXIMUM)),
+        )
+        low, high = (None if bound is None else _number(column, bound) for bound in data)
         return (
-            Statistics(low, high, found.get(_NULLS))
+            Statistics(low, high, statistics.get(_NULLS))
             if None not in (low, high)
-            else Statistics(None, None, found.get(_NULLS))
+            else Statistics(None, None, statistics.get(_NULLS))
         )
 
     def chunk(self, group: int, column: ParquetColumn) -> ColumnChunk:
@@ -182,7 +185,7 @@ def _parsed(data: Struct, begin: int) -> Footer:
         raise ValueError("the file is encrypted")
     elements = _structs(data, _ELEMENTS)
     columns, leaves = _columns(elements)
-    groups = tuple(_group(one, leaves) for one in _structs(data, _GROUPS))
+    groups = tuple(_group(group, leaves) for group in _structs(data, _GROUPS))
     metadata = {_text(pair.get(_KEY, b"")): _text(pair.get(_VALUE, b"")) for pair in _structs(data, _PAIRS)}
     footer = Footer(begin, columns, groups, metadata, _text(data.get(_WRITER, b"")))
     if footer.rows != data.get(_ROWS):
@@ -202,12 +205,12 @@ def _columns(elements: Sequence[Struct]) -> tuple[tuple[ParquetColumn, ...], int
     if not elements:
         raise ValueError("it has no schema")
     columns: list[ParquetColumn] = []
-    at, leaf = 1, 0
+    index, leaf = 1, 0
     for _ in range(elements[0].get(_CHILDREN, 0)):
-        end, leaves = _end_of(elements, at, 0)
-        columns.append(_column(elements[at], leaf))
-        at, leaf = end, leaf + leaves
-    if at != len(elements):
+        end, leaves = _end_of(elements, index, 0)
+        columns.append(_column(elements[index], leaf))
+        index, leaf = end, leaf + leaves
+    if index != len(elements):
         raise ValueError("its schema has elements outside of the columns")
     names = [column.name for column in columns]
     if len(set(names)) < len(names):
@@ -215,16 +218,16 @@ def _columns(elements: Sequence[Struct]) -> tuple[tuple[ParquetColumn, ...], int
     return tuple(columns), leaf
 
 
-def _end_of(elements: Sequence[Struct], at: int, depth: int) -> tuple[int, int]:
-    """The element after the one at `at` with all that is in it, and the number of leaves."""
-    if at >= len(elements) or depth > _DEPTH_MAX:
+def _end_of(elements: Sequence[Struct], index: int, depth: int) -> tuple[int, int]:
+    """The element after the one at this index with all that is in it, and the number of leaves."""
+    if index >= len(elements) or depth > _DEPTH_MAX:
         raise ValueError("its schema is not a tree")
-    children, leaves = elements[at].get(_CHILDREN, 0), 0
-    at += 1
+    children, leaves = elements[index].get(_CHILDREN, 0), 0
+    index += 1
     for _ in range(children):
-        at, inner = _end_of(elements, at, depth + 1)
+        index, inner = _end_of(elements, index, depth + 1)
         leaves += inner
-    return at, leaves if children > 0 else 1
+    return index, leaves if children > 0 else 1
 
 
 def _column(element: Struct, leaf: int) -> ParquetColumn:
@@ -241,15 +244,15 @@ def _kind(element: Struct) -> str | None:
 
 
 def _structs(data: Struct, key: int) -> list[Struct]:
-    found = data.get(key, [])
-    if not all(type(one) is dict for one in found):
+    structs = data.get(key, [])
+    if not all(type(struct) is dict for struct in structs):
         raise ValueError("a list has values of another type")
-    return list(found)
+    return list(structs)
 
 
 def _inner(data: Struct, key: int) -> Struct:
-    found: Struct = data.get(key, {})
-    return found
+    inner: Struct = data.get(key, {})
+    return inner
 
 
 def _text(data: bytes) -> str:

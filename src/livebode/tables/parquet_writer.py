@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, BinaryIO, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import lz4.block
 import numpy as np
@@ -57,19 +57,19 @@ def encoded(column: Column, kind: str, *, repeating: bool) -> tuple[list[Page], 
     Numbers are not copied.
     """
     if isinstance(column, Text):
-        used, at = _used(column)
+        used, numbers = _used(column)
         words = [word.encode() for word in used]
         dictionary = b"".join(len(word).to_bytes(4, "little") + word for word in words)
-        return _coded(dictionary, len(words), at), Bounds(min(words), max(words))
+        return _coded(dictionary, len(words), numbers), Bounds(min(words), max(words))
     form = FORMS[kind]
     if form.physical == BOOLEAN:
         bits = [np.packbits(part, bitorder="little").data for part in _parts(column)]
         pages = [Page(DATA_PAGE, min(_PAGE_ROWS, len(column) - k * _PAGE_ROWS), PLAIN, b) for k, b in enumerate(bits)]
         return pages, Bounds(column.all().tobytes(), column.any().tobytes())
     values = np.ascontiguousarray(column, form.dtype)
-    if repeating and (found := _dictionary_of(values)) is not None:
-        words_of, at = found
-        return _coded(words_of.data.cast("B"), len(words_of), at), _bounds(words_of)
+    if repeating and (coded := _dictionary_of(values)) is not None:
+        distinct, numbers = coded
+        return _coded(distinct.data.cast("B"), len(distinct), numbers), _bounds(distinct)
     return [Page(DATA_PAGE, len(part), PLAIN, part.data.cast("B")) for part in _parts(values)], _bounds(values)
 
 
@@ -78,10 +78,10 @@ def _parts(values: NDArray[Any]) -> Iterator[NDArray[Any]]:
         yield values[begin : begin + _PAGE_ROWS]
 
 
-def _coded(dictionary: _Buffer, words: int, at: NDArray[np.integer[Any]]) -> list[Page]:
+def _coded(dictionary: _Buffer, words: int, numbers: NDArray[np.integer[Any]]) -> list[Page]:
     """Numbers of words take whole bytes each: they compress better than those that take single bits."""
     width = 1 if words <= 1 << 8 else 2 if words <= 1 << 16 else 4
-    codes = at.astype(f"<u{width}")
+    codes = numbers.astype(f"<u{width}")
     pages = [Page(DICTIONARY_PAGE, words, PLAIN, dictionary)]
     for part in _parts(codes):
         head = bytes([8 * width]) + unsigned(-(-len(part) // 8) << 1 | 1)
@@ -95,17 +95,17 @@ def _dictionary_of(values: NDArray[Any]) -> tuple[NDArray[Any], NDArray[np.integ
     bits = values.view(f"i{values.itemsize}")
     begins = np.concatenate(([0], np.flatnonzero(bits[1:] != bits[:-1]) + 1))
     if 2 * len(begins) <= len(bits):  # over the lines of a response
-        words, at = np.unique(bits[begins], return_inverse=True)
-        at = np.repeat(at, np.diff(begins, append=len(bits)))
+        words, numbers = np.unique(bits[begins], return_inverse=True)
+        numbers = np.repeat(numbers, np.diff(begins, append=len(bits)))
     elif 2 * (period := _period(bits)) <= len(bits):  # over responses
-        words, at = np.unique(bits[:period], return_inverse=True)
-        at = np.tile(at, -(-len(bits) // period))[: len(bits)]
+        words, numbers = np.unique(bits[:period], return_inverse=True)
+        numbers = np.tile(numbers, -(-len(bits) // period))[: len(bits)]
     else:
         words = np.unique(bits)
         if 2 * len(words) > len(bits):
             return None
-        at = np.searchsorted(words, bits)
-    return words.view(values.dtype), at
+        numbers = np.searchsorted(words, bits)
+    return words.view(values.dtype), numbers
 
 
 def _period(bits: NDArray[Any]) -> int:
@@ -118,8 +118,8 @@ def _period(bits: NDArray[Any]) -> int:
 
 def _used(column: Text) -> tuple[list[str], NDArray[np.integer[Any]]]:
     """The words that are in a row, and their numbers."""
-    found = np.bincount(column.at, minlength=len(column.words)) > 0
-    return [word for word, used in zip(column.words, found) if used], (np.cumsum(found) - 1)[column.at]
+    is_used = np.bincount(column.at, minlength=len(column.words)) > 0
+    return [word for word, used in zip(column.words, is_used) if used], (np.cumsum(is_used) - 1)[column.at]
 
 
 def _bounds(values: NDArray[Any]) -> Bounds:
@@ -143,6 +143,14 @@ _RLE = integer(RLE)
 _NO_NULLS = integer(0)
 
 
+class ByteSink(Protocol):
+    """What a Parquet file is written to: a file, or what passes its bytes on."""
+
+    def write(self, data: bytes, /) -> object: ...
+
+    def writelines(self, lines: Iterable[bytes | memoryview], /) -> None: ...
+
+
 class ParquetWriter:
     """Writes each table as one row group, with statistics, compressed by LZ4 where that makes it smaller.
 
@@ -161,7 +169,7 @@ class ParquetWriter:
         If a column is of half precision.
     """
 
-    def __init__(self, file: BinaryIO, schema: Schema, repeating: Collection[str] = ()) -> None:
+    def __init__(self, file: ByteSink, schema: Schema, repeating: Collection[str] = ()) -> None:
         if wrong := [field.name for field in schema if field.kind not in FORMS]:
             raise TypeError(f"column {wrong[0]!r} is of half precision")
         self._file, self._schema, self._repeating = file, schema, frozenset(repeating)

@@ -311,7 +311,7 @@ def _joined(columns: Sequence[Column]) -> Column:
     return np.concatenate([column for column in columns if not isinstance(column, Text)])
 
 
-def _equal(one: Column, other: Column) -> bool:
-    if isinstance(one, Text) or isinstance(other, Text):
-        return isinstance(one, Text) and one == other
-    return np.array_equal(one, other, equal_nan=one.dtype.kind == "f")
+def _equal(column: Column, other: Column) -> bool:
+    if isinstance(column, Text) or isinstance(other, Text):
+        return isinstance(column, Text) and column == other
+    return np.array_equal(column, other, equal_nan=column.dtype.kind == "f")

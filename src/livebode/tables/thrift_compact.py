@@ -20,7 +20,7 @@ def field(number: int, kind: int) -> int:
     return number << 4 | kind
 
 
-def decode(data: bytes | memoryview, at: int = 0) -> tuple[Struct, int]:
+def decode(data: bytes | memoryview, position: int = 0) -> tuple[Struct, int]:
     """The struct that begins at this byte, and the byte after it.
 
     Memory and time are at most proportional to the bytes, whatever these declare.
@@ -31,7 +31,7 @@ def decode(data: bytes | memoryview, at: int = 0) -> tuple[Struct, int]:
         If there is none.
     """
     try:
-        return _struct(data, at, 0)
+        return _struct(data, position, 0)
     except IndexError:
         raise ValueError("it ends early") from None
 
@@ -60,104 +60,104 @@ def struct_of(*fields: tuple[int, int, bytes]) -> bytes:
     >>> decode(struct_of((1, I32, integer(-5)), (4, LIST, list_of(BINARY, [binary(b"a")]))))[0]
     {21: -5, 73: [b'a']}
     """
-    found = bytearray()
+    encoded = bytearray()
     before = 0
     for number, kind, value in fields:
-        found.append((number - before) << 4 | kind)
-        found += value
+        encoded.append((number - before) << 4 | kind)
+        encoded += value
         before = number
-    found.append(0)
-    return bytes(found)
+    encoded.append(0)
+    return bytes(encoded)
 
 
-def _struct(data: bytes | memoryview, at: int, depth: int) -> tuple[Struct, int]:
+def _struct(data: bytes | memoryview, position: int, depth: int) -> tuple[Struct, int]:
     """A footer has thousands of fields: most integers are read without a call."""
     if depth > _DEPTH_MAX:
         raise ValueError("values are nested too deeply")
-    found: Struct = {}
+    fields: Struct = {}
     number = 0
-    while head := data[at]:
-        at += 1
+    while head := data[position]:
+        position += 1
         kind = head & 15
         if head > 15:
             number += head >> 4
         else:
-            number, at = _integer(data, at)
+            number, position = _integer(data, position)
         if kind == I32 or kind == I64:  # noqa: SIM109 (faster)
-            value = data[at]
-            at += 1
+            value = data[position]
+            position += 1
             if value > 127:
-                value, at = _long(data, at, value)
-            found[number << 4 | kind] = value >> 1 ^ -(value & 1)
-        elif kind == BINARY and (size := data[at]) < 0x80 and (end := at + 1 + size) <= len(data):
-            found[number << 4 | kind] = bytes(data[at + 1 : end])
-            at = end
+                value, position = _long(data, position, value)
+            fields[number << 4 | kind] = value >> 1 ^ -(value & 1)
+        elif kind == BINARY and (size := data[position]) < 0x80 and (end := position + 1 + size) <= len(data):
+            fields[number << 4 | kind] = bytes(data[position + 1 : end])
+            position = end
         elif kind == STRUCT:
-            found[number << 4 | kind], at = _struct(data, at, depth + 1)
+            fields[number << 4 | kind], position = _struct(data, position, depth + 1)
         elif kind <= FALSE:
-            found[number << 4 | kind] = True
+            fields[number << 4 | kind] = True
         else:
-            found[number << 4 | kind], at = _value(data, at, kind, depth)
-    return found, at + 1
+            fields[number << 4 | kind], position = _value(data, position, kind, depth)
+    return fields, position + 1
 
 
-def _value(data: bytes | memoryview, at: int, kind: int, depth: int) -> tuple[Any, int]:
+def _value(data: bytes | memoryview, position: int, kind: int, depth: int) -> tuple[Any, int]:
     if kind == BINARY:
-        size, at = _unsigned(data, at)
-        return _bytes(data, at, size), at + size
+        size, position = _unsigned(data, position)
+        return _bytes(data, position, size), position + size
     if kind == STRUCT:
-        return _struct(data, at, depth + 1)
+        return _struct(data, position, depth + 1)
     if kind in (LIST, SET):
-        return _list(data, at, depth + 1)
+        return _list(data, position, depth + 1)
     if kind == DOUBLE:
-        return _bytes(data, at, 8), at + 8
+        return _bytes(data, position, 8), position + 8
     if kind in (TRUE, FALSE, BYTE):  # in a list a truth value has a byte of its own
-        return data[at], at + 1
+        return data[position], position + 1
     if kind in (I16, I32, I64):
-        return _integer(data, at)
+        return _integer(data, position)
     raise ValueError(f"there is no type {kind}")
 
 
-def _list(data: bytes | memoryview, at: int, depth: int) -> tuple[list[Any], int]:
+def _list(data: bytes | memoryview, position: int, depth: int) -> tuple[list[Any], int]:
     if depth > _DEPTH_MAX:
         raise ValueError("values are nested too deeply")
-    head = data[at]
-    count, at = (head >> 4, at + 1) if head < 0xF0 else _unsigned(data, at + 1)
-    if count > len(data) - at:
+    head = data[position]
+    count, position = (head >> 4, position + 1) if head < 0xF0 else _unsigned(data, position + 1)
+    if count > len(data) - position:
         raise ValueError("a list is longer than the bytes")
-    found = []
+    values = []
     kind = head & 15
     for _ in range(count):
-        value, at = _struct(data, at, depth) if kind == STRUCT else _value(data, at, kind, depth)
-        found.append(value)
-    return found, at
+        value, position = _struct(data, position, depth) if kind == STRUCT else _value(data, position, kind, depth)
+        values.append(value)
+    return values, position
 
 
-def _bytes(data: bytes | memoryview, at: int, size: int) -> bytes:
-    if size > len(data) - at:
+def _bytes(data: bytes | memoryview, position: int, size: int) -> bytes:
+    if size > len(data) - position:
         raise ValueError("it ends early")
-    return bytes(data[at : at + size])
+    return bytes(data[position : position + size])
 
 
-def _integer(data: bytes | memoryview, at: int) -> tuple[int, int]:
-    value, at = _unsigned(data, at)
-    return value >> 1 ^ -(value & 1), at
+def _integer(data: bytes | memoryview, position: int) -> tuple[int, int]:
+    value, position = _unsigned(data, position)
+    return value >> 1 ^ -(value & 1), position
 
 
-def _unsigned(data: bytes | memoryview, at: int) -> tuple[int, int]:
-    value = data[at]
-    return (value, at + 1) if value < 0x80 else _long(data, at + 1, value)
+def _unsigned(data: bytes | memoryview, position: int) -> tuple[int, int]:
+    value = data[position]
+    return (value, position + 1) if value < 0x80 else _long(data, position + 1, value)
 
 
-def _long(data: bytes | memoryview, at: int, value: int) -> tuple[int, int]:
+def _long(data: bytes | memoryview, position: int, value: int) -> tuple[int, int]:
     """A number whose first byte is `value`."""
     value &= 0x7F
     for shift in range(7, 70, 7):
-        byte = data[at]
-        at += 1
+        byte = data[position]
+        position += 1
         value |= (byte & 0x7F) << shift
         if byte < 0x80:
-            return value, at
+            return value, position
     raise ValueError("a number has more than ten bytes")
 
 
@@ -165,9 +165,9 @@ def unsigned(value: int) -> bytes:
     """A written integer that is not negative, without a sign."""
     if value < 0x80:
         return bytes((value,))
-    found = bytearray()
+    encoded = bytearray()
     while value >= 0x80:
-        found.append(value & 0x7F | 0x80)
+        encoded.append(value & 0x7F | 0x80)
         value >>= 7
-    found.append(value)
-    return bytes(found)
+    encoded.append(value)
+    return bytes(encoded)

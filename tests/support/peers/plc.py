@@ -12,8 +12,8 @@ from pyads.testserver import AdsTestServer, AdvancedHandler, PLCVariable
 from pyads.testserver.handler import AmsPacket, AmsResponseData
 
 from livebode.sources.live import Batch
-from livebode_drives.live.ring import FILETIME_1970
-from livebode_drives.structured_text.ring import ring_block, ring_type
+from livebode_drives.live.ads import FILETIME_1970
+from livebode_drives.structured_text.project import ring_block, ring_type
 from tests.support.peers.peer import CHANNELS, RATE_HZ, Peer, free_port, until
 from tools.structured_text import Machine
 

@@ -15,7 +15,7 @@ from pyads.testserver import PLCVariable
 
 from livebode.core import Lines
 from livebode.sources.live import Batch
-from livebode_drives.live.ring import FILETIME_1970
+from livebode_drives.live.ads import FILETIME_1970
 from livebode_drives.structured_text.project import Project
 from tests.support.peers.plc import AdsPeer
 from tools.structured_text import Instance, Machine

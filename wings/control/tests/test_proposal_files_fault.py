@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from livebode.core import PID, Cascade, PositionPD
-from livebode_control.trial.proposal_files import proposed_controller
+from livebode_control.trial.loop_trials import proposed_controller
 from livebode_control.tuning import LoopSpecification
 
 RATE_HZ = 4000.0

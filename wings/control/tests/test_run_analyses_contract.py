@@ -26,7 +26,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.parametrize(
     ("run", "analysis", "options", "command"),
     [
-        ("tune", "loop-check", {}, ["check-loop"]),
+        ("tune", "loop-check", {}, ["validate", "--loop"]),
         ("tune", "proposal", {"loop_checked": True}, ["tune", "--loop-checked"]),
         ("moving", "friction", {"places": 3}, ["friction", "--places", "3"]),
         ("moving", "orders", {}, ["orders"]),

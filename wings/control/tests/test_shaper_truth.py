@@ -1,4 +1,4 @@
-"""`livebode shaper`: the mode that `livebode fit` finds is shaped, and the advice of a refusal gives a shaper."""
+"""`livebode tune --shaper`: the mode that `livebode fit` finds is shaped, and the advice of a refusal works."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def crane(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
 
 def test_the_mode_of_a_fit_is_shaped(crane: Path) -> None:
     fitted = json.loads(livebode("fit", crane, "--model", "modal", "--json").out)
-    shaped = livebode("shaper", crane, "--model", "modal", "--json")
+    shaped = livebode("tune", crane, "--shaper", "--model", "modal", "--json")
     assert shaped.code == 0, shaped.err
     mode = json.loads(shaped.out)["mode"]
     assert mode["low_hz"] < 0.7355 < mode["high_hz"]
@@ -42,10 +42,23 @@ def test_the_mode_of_a_fit_is_shaped(crane: Path) -> None:
     assert "0.735" in json.dumps(fitted)
 
 
+def test_options_of_shapers_and_of_gains_exclude_each_other(crane: Path) -> None:
+    for options in (("--tolerance", 0.02), ("--mode", "resonance"), ("--model", "modal"), ("--klipper-axis", "y")):
+        refused = livebode("tune", crane, *options)
+        assert (refused.code, f"{options[0]} belongs to --shaper; give --shaper too" in refused.err) == (2, True)
+    for option in ("--loop-checked", "--no-low-pass", "--odrive"):
+        refused = livebode("tune", crane, "--shaper", option)
+        assert refused.code == 2
+        assert f"{option.replace('no-', '')} and --shaper exclude each other" in refused.err
+
+
 def test_the_advice_of_a_refusal_is_an_option_that_works(crane: Path) -> None:
+    advice = set()
     for model in ((), ("--model", "two-mass-gain"), ("--model", "rational")):
-        refused = livebode("shaper", crane, *model)
+        refused = livebode("tune", crane, "--shaper", *model)
         assert refused.code == 2
         found = re.search(r"choose the model '(\w+)'.*\(option (--\w+)\)", refused.err)
         assert found is not None, refused.err
-        assert livebode("shaper", crane, found[2], found[1]).code == 0
+        advice.add((found[2], found[1]))
+    for option in advice:
+        assert livebode("tune", crane, "--shaper", *option).code == 0

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from livebode.core import PID, UsageError
-from livebode_control.trial.trial_feedback import trial_feedback
-from livebode_control.trial.trial_steps import trial_steps
+from livebode_control.trial.trial_steps import trial_feedback, trial_steps
 from livebode_control.tuning.filters import low_pass, notch
 from livebode_control.tuning.plant_band import PlantBand
 

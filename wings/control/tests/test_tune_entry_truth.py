@@ -27,7 +27,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("gantry")
     write_examples(["matrix-tune"], folder)
     assert livebode("run", folder / "gantry-tune.toml", "--out", folder / "run").code == 0
-    assert "as described" in livebode("check-loop", folder / "run").out
+    assert "as described" in livebode("validate", folder / "run", "--loop").out
     return folder / "run"
 
 

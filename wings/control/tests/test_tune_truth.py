@@ -6,6 +6,7 @@ import json
 import re
 import tomllib
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -43,9 +44,9 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_a_run_is_tuned_once_its_loop_was_checked(run: Path) -> None:
     refused = livebode("tune", run)
     assert refused.code == 2
-    assert "livebode check-loop" in refused.err
-    assert livebode("check-loop", run).out.startswith("loop checked: as described")
-    done = livebode("tune", run)
+    assert "livebode validate --loop" in refused.err
+    assert livebode("validate", run, "--loop").out.startswith("loop checked: as described")
+    done = livebode("tune", run, pictures=True)
     assert done.code == 0, done.err
     assert "velocity.gain" in done.out
     assert "is promised" in done.out
@@ -60,12 +61,15 @@ def test_a_run_is_tuned_once_its_loop_was_checked(run: Path) -> None:
 
 def test_a_link_in_the_run_is_replaced_and_not_followed(run: Path, tmp_path: Path) -> None:
     (tmp_path / "thesis.tex").write_text("years of work")
-    names = {"tune": ("tune.json", "filters.h", "filters.st", "gains.toml"), "shaper": ("shaper.h", "shaper.cfg")}
-    for command, files in names.items():
+    names = {
+        "--loop-checked": ("tune.json", "filters.h", "filters.st", "gains.toml"),
+        "--shaper": ("shaper.h", "shaper.cfg"),
+    }
+    for option, files in names.items():
         for name in files:
             (run / name).unlink(missing_ok=True)
             (run / name).symlink_to(tmp_path / "thesis.tex")
-        assert livebode(command, run, *(["--loop-checked"] if command == "tune" else [])).code == 0
+        assert livebode("tune", run, option).code == 0
         assert not any((run / name).is_symlink() for name in files)
     assert (tmp_path / "thesis.tex").read_text() == "years of work"
 
@@ -109,13 +113,44 @@ def test_a_bandwidth_out_of_reach_ends_with_the_best_and_exit_code_two(run: Path
     assert "the best promises" in done.out + done.err
 
 
+def proposed(run: Path, *options: object) -> Any:
+    done = livebode("tune", run, "--loop-checked", *options, "--json")
+    assert done.code == 0, done.err
+    return json.loads(done.out)
+
+
+def test_what_is_promised_has_the_margins_that_were_required(run: Path) -> None:
+    usual, careful = proposed(run), proposed(
+        run, "--gain-margin-db", 8, "--phase-margin-deg", 45, "--disk-margin", 0.8, "--max-sensitivity", 1.8
+    )  # fmt: skip
+    assert usual["promised"]["disk_margin"] < 0.8 < careful["promised"]["disk_margin"]
+    assert careful["promised"]["gain_margin_db"] >= 8
+    assert careful["promised"]["phase_margin_deg"] >= 45
+    assert careful["promised"]["max_sensitivity"] <= 1.8
+    assert careful["promised"]["bandwidth_hz"] < usual["promised"]["bandwidth_hz"]
+
+
+def test_the_noise_of_the_input_is_at_most_what_was_permitted(run: Path) -> None:
+    usual = proposed(run)["noise"]["after"]
+    limit = 0.7 * (1 + 1e-5)  # the optimiser's tolerance
+    assert proposed(run, "--noise-gain", 0.7 * usual)["noise"]["after"] <= limit * usual
+    step = 2 * np.pi / 2**17
+    rounded = proposed(run, "--encoder-step", step)["noise"]["after"]
+    assert proposed(run, "--encoder-step", step, "--input-noise", 0.7 * rounded)["noise"]["after"] <= limit * rounded
+
+
+def test_lines_below_the_required_coherence_are_not_used(run: Path) -> None:
+    refused = livebode("tune", run, "--loop-checked", "--coherence", 1.0)
+    assert (refused.code, "coherence" in refused.err) == (2, True), refused
+
+
 def test_a_description_that_the_check_contradicts_is_never_tuned(run: Path) -> None:
     other = run.parent / "gain.toml"
     words = (run.parent / "axis.toml").read_text(encoding="utf-8")
     other.write_text(words.replace("0.2308", "0.3"), encoding="utf-8")
-    assert "livebode check-loop" in livebode("tune", run, "--axis", other).err
+    assert "livebode validate --loop" in livebode("tune", run, "--axis", other).err
     assert livebode("tune", run, "--axis", other, "--loop-checked").code == 0
-    assert "loop.velocity.gain" in livebode("check-loop", run, "--axis", other).out
+    assert "loop.velocity.gain" in livebode("validate", run, "--loop", "--axis", other).out
     for more in ((), ("--loop-checked",)):
         done = livebode("tune", run, "--axis", other, *more)
         assert done.code == 2
@@ -196,7 +231,7 @@ def test_gains_over_the_schedule_are_proposed_from_stops_at_places(tmp_path: Pat
     words = words.replace('output = "y"', 'output = "velocity"\nschedule = "x"')
     (tmp_path / "axis.toml").write_text(words, encoding="utf-8")
     assert livebode("run", tmp_path / "axis.toml", "--out", tmp_path / "run").code == 0
-    done = livebode("tune", tmp_path / "run", "--loop-checked", "--schedule")
+    done = livebode("tune", tmp_path / "run", "--loop-checked", "--schedule", pictures=True)
     assert done.code == 0, done.err
     assert "gains over the schedule" in done.out
     rows = (tmp_path / "run" / "gains.csv").read_text(encoding="utf-8").splitlines()
@@ -206,7 +241,7 @@ def test_gains_over_the_schedule_are_proposed_from_stops_at_places(tmp_path: Pat
 
 def test_input_shapers_are_proposed_for_the_load_of_a_stiff_drive(run: Path) -> None:
     """The load of the true belt swings at 43.48 Hz with a damping of 0.0355 while the motor is held."""
-    done = livebode("shaper", run, "--axis", "y", "--json")
+    done = livebode("tune", run, "--shaper", "--klipper-axis", "y", "--json")
     assert done.code == 0, done.err
     found = json.loads(done.out)
     assert found["mode"]["low_hz"] < 43.48 < found["mode"]["high_hz"]
@@ -215,5 +250,5 @@ def test_input_shapers_are_proposed_for_the_load_of_a_stiff_drive(run: Path) -> 
     assert best["worst"] <= 0.05
     assert "shaper_freq_y: 43" in (run / "shaper.cfg").read_text(encoding="utf-8")
     assert "LIVEBODE_SHAPER" in (run / "shaper.h").read_text(encoding="utf-8")
-    assert "proposed" in livebode("shaper", run).out
-    assert "no parameter 'wobble'" in livebode("shaper", run, "--mode", "wobble").err
+    assert "proposed" in livebode("tune", run, "--shaper").out
+    assert "no parameter 'wobble'" in livebode("tune", run, "--shaper", "--mode", "wobble").err

@@ -19,7 +19,7 @@ from playwright.sync_api import Browser, Route
 from livebode.analysis import by_place, stable
 from livebode.configuration import LoopSection
 from livebode.core import PID, Algebra, Cascade, Model, Responses
-from livebode.dashboard import Dashboard, Serving
+from livebode.dashboard import Dashboard, ServerSettings
 from livebode.records import RunRecord
 from livebode_control.tuning import LoopSpecification
 from livebode_control.tuning.filters import Biquad, low_pass, notch
@@ -59,7 +59,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def tab(browser: Browser, run: Path) -> Iterator[Tab]:
-    dashboard = Dashboard(Serving("127.0.0.1", 0))
+    dashboard = Dashboard(ServerSettings("127.0.0.1", 0))
     dashboard.view(run)
     with dashboard, Tab(browser, dashboard.url + ADDRESS) as found:
         found.until("bode.drawn['what if'] && whatIf.margins.after")
@@ -251,13 +251,13 @@ def test_filters_are_the_biquads_of_python_and_are_copied(tab: Tab) -> None:
         "velocity": {"gain": TRIAL["gain"], "integral_time_s": TRIAL["integral_time_s"]},
         "position": {"gain": TRIAL["position_gain"]},
     }
-    assert "check-loop: not checked" in text
+    assert "loop check: not checked" in text
 
 
 def test_an_unchecked_loop_is_shown_and_nothing_is_written(tab: Tab, run: Path) -> None:
     before = sorted((path.name, path.stat().st_mtime_ns) for path in run.rglob("*"))
     check = tab.page.locator("#what-if-check")
-    assert check.inner_text().startswith("check-loop: not checked")
+    assert check.inner_text().startswith("loop check: not checked")
     assert "not promises" in check.inner_text()
     assert "nothing is written to a machine" in tab.page.locator("#what-if-card").inner_text()
     bar = tab.page.locator('#what-if-rows [type=range][data-part="delay"]')
@@ -313,6 +313,27 @@ def test_an_unstable_trial_is_named_and_has_no_margins(tab: Tab) -> None:
     assert set(cells) == {"unstable"}
     assert tab.page.locator(".step").first.is_hidden()
     assert "unstable" in tab.page.locator("#what-if-steps").inner_text()
+
+
+def test_margins_of_a_known_loop(tab: Tab) -> None:
+    """L = K / (jr (1 + jr)²) with r = f/10: −180° at 10 Hz, gain margin 2/K; |L| = 1 where r (1 + r²) = K."""
+    f = np.geomspace(1, 100, 2001)
+    r, gain = f / 10, 0.5
+    value = gain / (1j * r * (1 + 1j * r) ** 2)
+    db, deg = 20 * np.log10(np.abs(value)), np.degrees(np.unwrap(np.angle(value)))
+    found = tab.page.evaluate(
+        """async ([hz, db, deg]) => {
+          const { marginsOf } = await import("/static/whatif.js");
+          return marginsOf(hz, db, deg, hz.map(() => 0.1));
+        }""",
+        [f.tolist(), db.tolist(), deg.tolist()],
+    )
+    crossing = next(float(x.real) for x in np.roots([1, 0, 1, -gain]) if abs(x.imag) < 1e-12)
+    phase = 180 - 90 - 2 * np.degrees(np.arctan(crossing))
+    assert [one["kind"] for one in found] == ["gain", "phase"]
+    assert [one["hz"] for one in found] == pytest.approx([10, 10 * crossing], rel=1e-5)
+    assert [one["value"] for one in found] == pytest.approx([20 * np.log10(2 / gain), phase], abs=1e-3)
+    assert [one["reach"] for one in found] == pytest.approx([0.1, 0.1])
 
 
 def test_a_phase_beyond_a_turn_gets_that_of_the_factor(tab: Tab) -> None:

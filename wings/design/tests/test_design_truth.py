@@ -216,7 +216,9 @@ def test_the_seed_in_a_file_makes_the_same_file_again(tmp_path):
 
 
 def test_the_table_gives_each_choice_with_its_reason(tmp_path):
-    shown = livebode("design", ROOT / "examples" / "experiment.toml", "--out", tmp_path / "d", "--to", "csv")
+    shown = livebode(
+        "design", ROOT / "examples" / "experiment.toml", "--out", tmp_path / "d", "--to", "csv", pictures=True
+    )
     assert shown.code == 0, shown.err
     for word in ("lines", "window", "amplitude", "peak torque", "following error", "95 % bound", "recording", "hop"):
         assert word in shown.out

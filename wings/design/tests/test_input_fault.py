@@ -377,6 +377,8 @@ def test_only_the_files_of_a_previous_design_are_replaced(experiment, tmp_path):
     assert "exists already" in livebode("design", experiment, "--out", out).err
     assert livebode("design", experiment, "--out", out, "--amplitude", "0.5", "--force").code == 0
     assert json.loads((out / "design.json").read_text())["excitation"]["amplitude_n_m"] == 0.5
+    done = livebode("design", experiment, "--out", out, "--accuracy", "0.002", "--force", "--json")
+    assert max(json.loads(done.out)["bound_95_relative"]) <= 0.002
     (out / "log.parquet").write_text("an afternoon")
     assert "also contains 'log.parquet'" in livebode("design", experiment, "--out", out, "--force").err
     assert (out / "log.parquet").read_text() == "an afternoon"

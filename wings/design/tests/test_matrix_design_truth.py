@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from livebode.core import Block, DesignError, MatrixResponses, UsageError
 from livebode.simulation import CoreXYLoop, GantryLoop
 from livebode_design import MatrixDesign, MatrixLimits, MatrixSpec, MechanismMachine, choose_matrix
-from livebode_design.matrix.amplitude import best_amplitudes
-from livebode_design.matrix.candidate import RESERVE
+from livebode_design.matrix.candidate import RESERVE, best_amplitudes
 from livebode_matrix import MatrixSettings, MatrixTracker
 
 GANTRY = MechanismMachine(loop=GantryLoop(), noise=(0.05, 0.05, 0.001), torque_constant_n_m_per_a=0.5)

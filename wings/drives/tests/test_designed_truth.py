@@ -11,10 +11,9 @@ import numpy as np
 import pytest
 
 from livebode.core import Lines, RecordingError
-from livebode.excitation import Waveform, multisine
-from livebode.structured_text import multisine as block_text
+from livebode.excitation import Waveform, function_block, multisine
 from livebode_design import write
-from livebode_drives.designed import read_designed
+from livebode_drives.excitation_file import read_designed
 from tests.support.command import livebode
 from tests.support.errors import refused
 from tools.structured_text import Machine
@@ -182,4 +181,4 @@ def test_force_replaces_all_but_a_program_that_was_completed(more: tuple[str, ..
 
 def test_a_ramp_as_long_as_the_counter_holds_is_taken() -> None:
     """Half a second at 100 kHz with a window of 2 are 25,000 periods."""
-    assert "level = 50000)" in block_text([1.0, -1.0], rate_hz=1e5, limit=1, ramp_periods=25_000)
+    assert "level = 50000)" in function_block([1.0, -1.0], rate_hz=1e5, limit=1, ramp_periods=25_000)

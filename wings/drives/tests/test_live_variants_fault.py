@@ -13,8 +13,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from livebode.core import Channel, SourceError
+from livebode_drives.live.ads import FILETIME_1970, HEADER, MAGIC, Ring, new_rows, read_ring, ring_batch
 from livebode_drives.live.opcua import INCOMPLETE_MAX, StampCollector
-from livebode_drives.live.ring import FILETIME_1970, HEADER, MAGIC, Ring, new_rows, read_ring, ring_batch
 from livebode_drives.live.stamp_numbers import StampNumbers
 from tests.support.damaged_bytes import damaged, one_sentence
 from tests.support.errors import refused

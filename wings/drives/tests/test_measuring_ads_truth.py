@@ -14,9 +14,9 @@ from livebode.configuration import Axis
 from livebode.core import MeasurementError
 from livebode.records import RunRecord
 from livebode.runtime import Destination, run
-from livebode_design import Experiment, Prepared, design_experiment, measure, prepare
+from livebode_design import Experiment, ReadyMeasurement, design_experiment, measure, prepare
 from livebode_design.playback import StopRequest
-from livebode_drives.designed import read_designed
+from livebode_drives.excitation_file import read_designed
 from tests.support.command import write_csv
 from tests.support.errors import refused
 from tests.support.peers.peer import Feeding, until
@@ -75,7 +75,7 @@ def plc(known: Path, tmp_path: Path) -> Iterator[PlcProgram]:
         yield found
 
 
-def prepared(plc: PlcProgram, known: Path, **more: object) -> tuple[Experiment, Prepared]:
+def prepared(plc: PlcProgram, known: Path, **more: object) -> tuple[Experiment, ReadyMeasurement]:
     experiment = described(known, source=plc.settings, **more)
     return experiment, prepare(experiment)
 

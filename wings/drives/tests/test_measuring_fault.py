@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from livebode.core import ConfigError, MeasurementError
 from livebode.sources.live import SourceSettings
 from livebode_design import Experiment, prepare
-from livebode_design.measuring import make_player
+from livebode_design.measurement import make_player
 from tests.support.command import livebode
 from tests.support.errors import refused
 from tests.support.forked import Command

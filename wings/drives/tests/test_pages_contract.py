@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from livebode.configuration import Axis
-from livebode_drives.live.ring import FILETIME_1970, HEADER, read_ring
-from livebode_drives.structured_text.ring import ring_block, ring_type
+from livebode_drives.live.ads import FILETIME_1970, HEADER, read_ring
+from livebode_drives.structured_text.project import ring_block, ring_type
 from tests.support.command import livebode
 from tools.structured_text import Instance, Machine
 from tools.structured_text.types import ULINT

@@ -10,9 +10,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from livebode.core import Lines, UsageError
-from livebode.structured_text import multisine
-from livebode_drives.structured_text.project import Project
-from livebode_drives.structured_text.ring import ring_block, ring_type
+from livebode.excitation import function_block
+from livebode_drives.structured_text.project import Project, ring_block, ring_type
 from livebode_drives.structured_text.sliding_dft import sliding_dft
 from tests.support.command import livebode
 from tests.support.errors import refused
@@ -62,7 +61,7 @@ def test_a_channel_name_that_structured_text_forbids_is_refused_with_the_nearest
 def test_every_kind_of_name_is_held_to_the_same() -> None:
     for make in (
         lambda: sliding_dft(LINES, ["u"], name="FB__Dft"),
-        lambda: multisine(PERIOD, rate_hz=1e3, limit=2, name="FB__Multisine"),
+        lambda: function_block(PERIOD, rate_hz=1e3, limit=2, name="FB__Multisine"),
         lambda: ring_type(1, 1e3, name="ST__Ring"),
         lambda: ring_block(["u"], name="FB__Ring"),
         lambda: ring_block(["u"], type_name="ST__Ring"),
@@ -96,7 +95,7 @@ def test_an_excitation_that_no_block_can_play_is_refused(
     period, given: dict[str, float], code: str, facts: dict
 ) -> None:
     with refused(UsageError, code, **facts):
-        multisine(period, **({"rate_hz": 1e3, "limit": 2.0} | given))
+        function_block(period, **({"rate_hz": 1e3, "limit": 2.0} | given))
 
 
 sizes = st.floats(1e-100, 1e100)
@@ -109,12 +108,12 @@ sizes = st.floats(1e-100, 1e100)
 def test_the_scale_that_a_refusal_names_passes_and_a_larger_one_by_a_thousandth_does_not(shape, size, limit) -> None:
     period = np.array(shape) * size
     try:
-        multisine(period, rate_hz=1e3, limit=limit)
+        function_block(period, rate_hz=1e3, limit=limit)
     except UsageError as error:
         scale = error.scale_max
-        assert multisine(period * scale, rate_hz=1e3, limit=limit)
+        assert function_block(period * scale, rate_hz=1e3, limit=limit)
         with refused(UsageError, "conflict", argument="limit"):
-            multisine(period * scale * 1.002, rate_hz=1e3, limit=limit)
+            function_block(period * scale * 1.002, rate_hz=1e3, limit=limit)
 
 
 def test_blocks_too_large_for_a_plc_are_refused_with_the_largest_that_fits() -> None:

@@ -13,7 +13,7 @@ from livebode.core import Lines
 from livebode.estimation import Settings, Tracker
 from livebode.excitation import multisine
 from livebode.sources.live import SourceSettings, named_channels, open_source
-from livebode_drives.live.ring import FILETIME_1970, HEADER, new_rows, read_ring, ring_batch
+from livebode_drives.live.ads import FILETIME_1970, HEADER, new_rows, read_ring, ring_batch
 from livebode_drives.structured_text.project import Project
 from tests.support.peers.peer import PATIENCE_S, Feeding
 from tests.support.peers.plc import AdsPeer

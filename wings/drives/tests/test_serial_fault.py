@@ -14,8 +14,7 @@ from livebode.core import Channel, ConfigError, SourceError
 from livebode.sources.live import ClockReading, Position, SourceEvents, SourceSettings, make_source
 from livebode_drives.live.arrival_rate import ArrivalRate
 from livebode_drives.live.counter import Counter
-from livebode_drives.live.number_lines import NumberLines, numbers_in
-from livebode_drives.live.serial_line import UNKNOWN_BYTES, FramesOrJson, NumbersDecoder
+from livebode_drives.live.serial_line import UNKNOWN_BYTES, FramesOrJson, NumberLines, NumbersDecoder, numbers_in
 from tests.support.damaged_bytes import damaged, one_sentence
 from tests.support.errors import refused
 from tests.support.peers.peer import CHANNELS, PATIENCE_S, RATE_HZ, Feeding, batches, fed

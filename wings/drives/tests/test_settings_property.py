@@ -12,12 +12,11 @@ from hypothesis import HealthCheck, Phase, example, given, settings
 from hypothesis import strategies as st
 
 from livebode.core import Lines
+from livebode.excitation import function_block
 from livebode.kernel import SlidingDFT
-from livebode.structured_text import as_name, check_name, multisine
-from livebode.structured_text.names import NAME_LENGTH_MAX
-from livebode_drives.live.ring import HEADER, read_ring
-from livebode_drives.structured_text.project import Project
-from livebode_drives.structured_text.ring import ring_block, ring_type
+from livebode.structured_text import NAME_LENGTH_MAX, as_name, check_name
+from livebode_drives.live.ads import HEADER, read_ring
+from livebode_drives.structured_text.project import Project, ring_block, ring_type
 from livebode_drives.structured_text.sliding_dft import sliding_dft
 from livebode_drives.structured_text.twincat import twincat
 from tools.structured_text import Machine, parse
@@ -73,7 +72,7 @@ def test_a_sliding_dft_of_any_settings_is_the_kernel(lines, channels, name, phas
 )
 @example([5e-324, -1.0, 1e-7, 123456.0], 1, "(* \n *) ; // END_VAR ]]>")
 def test_a_period_of_any_numbers_is_played_to_the_bit(period, ramp_periods, note) -> None:
-    text = multisine(period, rate_hz=1e3, limit=max(map(abs, period)), ramp_periods=ramp_periods, note=note)
+    text = function_block(period, rate_hz=1e3, limit=max(map(abs, period)), ramp_periods=ramp_periods, note=note)
     block = Machine(text).instance("FB_Multisine")
     played = []
     for _ in range((3 + ramp_periods) * len(period)):

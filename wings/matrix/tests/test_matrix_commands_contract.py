@@ -75,8 +75,8 @@ def test_a_run_draws_its_pictures_and_is_replaced_with_them(folder: Path) -> Non
         found = livebode(*again, pictures=True)
         assert (found.code, found.err) == (0, "")
     assert sorted(path.name for path in (folder / "drawn").iterdir()) == [
-        "bode.png", "covariance.parquet", "events.jsonl", "responses.parquet", "run-copy.json", "run.json",
-        "singular-values.png",
+        "bode.png", "covariance.parquet", "events.jsonl", "manifest.jsonl", "responses.parquet", "run-copy.json",
+        "run.json", "singular-values.png",
     ]  # fmt: skip
 
 
@@ -207,7 +207,7 @@ def test_what_cannot_be_exported_is_refused_in_one_sentence(folder: Path, option
         (
             "report {0}/before --on {0}/after.parquet --out {0}/r.html",
             "`livebode validate RUN --entry OUTPUT/INPUT --on RUN`",
-            "validate {0}/before --entry velocity1/u1 --on {0}/after --model rational",
+            "validate {0}/before --entry velocity1/u1 --on {0}/after --model modal",
         ),
     ],
 )
@@ -291,21 +291,21 @@ def test_each_controller_of_a_matrix_is_checked_with_its_own_signals(folder: Pat
     words = (folder / "before.toml").read_text()
     for name, gain in (("right", "0.3"), ("wrong", "0.33")):
         (folder / f"{name}.toml").write_text(words + CONTROLLERS.replace("GAIN", gain))
-    found = json.loads(livebode("check-loop", folder / "before", "--axis", folder / "wrong.toml", "--json").out)
+    found = json.loads(livebode("validate", folder / "before", "--loop", "--axis", folder / "wrong.toml", "--json").out)
     for one in found["controllers"].values():
         assert one["verdict"] == "one change"
         assert abs(one["explanations"][0]["value"] - 0.3) < 1e-4
     tune = ("tune", folder / "before", "--axis", folder / "right.toml", "--entry")
-    assert "livebode check-loop" in livebode(*tune, "velocity1/u1").err  # another description was checked
-    found = json.loads(livebode("check-loop", folder / "before", "--axis", folder / "right.toml", "--json").out)
+    assert "livebode validate --loop" in livebode(*tune, "velocity1/u1").err  # another description was checked
+    found = json.loads(livebode("validate", folder / "before", "--loop", "--axis", folder / "right.toml", "--json").out)
     assert [one["verdict"] for one in found["controllers"].values()] == ["as described"] * 2
     # The loop crosses beside the lowest line, and it is refused as for a single response.
     assert "add the lines" in livebode(*tune, "velocity1/u1").err
     assert "no controller joins velocity1 and u2" in livebode(*tune, "velocity1/u2").err
-    assert "no controller is described" in livebode("check-loop", folder / "before").err
+    assert "no controller is described" in livebode("validate", folder / "before", "--loop").err
 
 
-@pytest.mark.parametrize("command", [["shaper"], ["learn", "--out", "baseline.json"]])
+@pytest.mark.parametrize("command", [["tune", "--shaper"], ["learn", "--out", "baseline.json"]])
 def test_what_needs_a_single_response_refuses_a_matrix_in_one_sentence(folder: Path, command: list[str]) -> None:
     found = livebode(*command, folder / "before")
     assert found.code == 2

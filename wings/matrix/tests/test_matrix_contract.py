@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from livebode.core import Block, GridError, Lines, MatrixResponses, SignalError, StateError, UsageError
-from livebode.mimo import MatrixExcitation, MatrixLoop, predict, within_limits
+from livebode.core import Block, GridError, Lines, MatrixLoop, MatrixResponses, SignalError, StateError, UsageError
+from livebode.excitation import MatrixExcitation
 from livebode_matrix import MatrixSettings, MatrixTracker, example_matrix_responses
 
 LINES = Lines.parse("10:40:5", rate_hz=1000, window=200)
@@ -196,11 +196,11 @@ def test_wrong_matrices_limits_and_samples_are_refused() -> None:
         MatrixExcitation.orthogonal(LINES, 2, [1.0, 2.0, 3.0])
     two = MatrixExcitation.orthogonal(LINES, 2)
     with pytest.raises(UsageError, match="no limit is finite"):
-        within_limits(two, lambda f: np.tile(GAIN, (len(f), 1, 1)))
+        two.within_limits(lambda f: np.tile(GAIN, (len(f), 1, 1)))
     with pytest.raises(UsageError, match="input_max=0 is not above 0"):
-        within_limits(two, lambda f: np.tile(GAIN, (len(f), 1, 1)), input_max=0)
+        two.within_limits(lambda f: np.tile(GAIN, (len(f), 1, 1)), input_max=0)
     with pytest.raises(UsageError, match="does not separate"):
-        predict(two.scaled([1.0, 0.0]), lambda f: np.tile(GAIN, (len(f), 1, 1)), 0.1)
+        two.scaled([1.0, 0.0]).predict(lambda f: np.tile(GAIN, (len(f), 1, 1)), 0.1)
     with pytest.raises(SignalError, match="the block is empty"):
         tracker().process(block_of(ORTHOGONAL[:, :0]))
     with pytest.raises(SignalError, match="500 samples per second"):

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from livebode.core import Block, Lines, MatrixResponses
-from livebode.mimo import MatrixExcitation, mean_matrix
+from livebode.excitation import MatrixExcitation
+from livebode.fitting import mean_matrix
 from livebode_matrix import MatrixSettings, MatrixTracker
 
 LINES = Lines.parse("50:200:50", rate_hz=1000, window=100)

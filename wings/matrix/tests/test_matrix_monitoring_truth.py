@@ -15,7 +15,8 @@ from livebode.configuration import Axis, recipe_id
 from livebode.core import BaselineError, ConfigError, Event, Lines, LivebodeError, StateError, UsageError
 from livebode.dashboard import Quantities
 from livebode.dashboard.overlays import overlays_of
-from livebode.mimo import MatrixExcitation, mean_matrix
+from livebode.excitation import MatrixExcitation
+from livebode.fitting import mean_matrix
 from livebode.publishing.feed import AxisFeed
 from livebode.runtime import Destination, run
 from livebode.simulation import Gantry, GantryLoop

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from livebode.core import PID, Block, Lines, MatrixResponses
-from livebode.mimo import MatrixExcitation, MatrixLoop, predict, within_limits
+from livebode.core import PID, Block, Lines, MatrixLoop, MatrixResponses
+from livebode.excitation import MatrixExcitation
 from livebode.simulation import Gantry, GantryLoop
 from livebode_matrix import MatrixSettings, MatrixTracker
 
@@ -84,7 +84,7 @@ def test_bounds_of_each_entry_cover_the_truth_as_stated() -> None:
 
 def test_the_prediction_is_the_scatter_of_the_estimates_and_the_peaks_those_of_the_recording() -> None:
     used = excitation("orthogonal", dwell=3, settle=2)
-    predicted = predict(used, lambda f: LOOP.gantry.response(f, LOOP.rate_hz), 0.05, DESCRIBED)
+    predicted = used.predict(lambda f: LOOP.gantry.response(f, LOOP.rate_hz), 0.05, DESCRIBED)
     w = np.tile(used.samples, 150)
     noise = 0.05 * np.random.default_rng(4).standard_normal((3, w.shape[1]))
     found = MatrixTracker(settings(dwell=3, settle=2, hop=200)).process(LOOP.simulate(w, noise=noise))[1::2]
@@ -102,8 +102,8 @@ def test_the_largest_excitation_reaches_one_limit_and_exceeds_none() -> None:
         return LOOP.gantry.response(f, LOOP.rate_hz)
 
     limits = {"input_max": [0.5, 0.4], "output_max": [20.0, 20.0, 0.3]}
-    limited = within_limits(excitation("interleaved"), plant, loop=DESCRIBED, **limits)  # type: ignore[arg-type]
-    reached = predict(limited, plant, 0.05, DESCRIBED)
+    limited = excitation("interleaved").within_limits(plant, loop=DESCRIBED, **limits)  # type: ignore[arg-type]
+    reached = limited.predict(plant, 0.05, DESCRIBED)
     shares = np.concatenate([reached.input_peak / limits["input_max"], reached.output_peak / limits["output_max"]])
     assert shares.max() == pytest.approx(1.0)
 

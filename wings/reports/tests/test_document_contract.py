@@ -218,16 +218,23 @@ def test_without_typst_the_page_is_written_and_the_missing_pdf_is_reported(
     assert not (run / "report.pdf").exists()
 
 
+TEXTS = ("--company", "Drives Ltd", "--customer", "Muster AG", "--conditions", "20 degrees, no load")
+
+
 def test_the_first_page_is_from_template_and_options_on_the_paper_that_is_asked_for(tmp_path: Path) -> None:
     run, template = write_run(tmp_path / "run", measured(20, 1)), tmp_path / "t.toml"
     template.write_text('[report]\nmachine = "M"\noperator = "Ann"\npaper = "letter"\n', encoding="utf-8")
-    done = livebode("report", run, "--template", template, "--operator", "Bob <b>", "--out", tmp_path / "r")
+    done = livebode("report", run, "--template", template, "--operator", "Bob <b>", *TEXTS, "--out", tmp_path / "r")
     assert done.code == 0, done.err
     page = PdfReader(tmp_path / "r.pdf").pages[0]
     assert [float(side) for side in page.mediabox[2:]] == [612, 792]
     text = page.extract_text()
     assert ("Bob <b>" in text, "Ann" in text, "not judged" in text) == (True, False, True)
     assert "size: letter" in (tmp_path / "r.html").read_text("utf-8")
+    assert all(words in text for words in TEXTS[1::2])
+    compared = livebode("compare", run, run, *TEXTS, "--out", tmp_path / "c")
+    assert compared.code == 0, compared.err
+    assert all(words in (tmp_path / "c.html").read_text("utf-8") for words in TEXTS[1::2])
 
 
 @pytest.mark.parametrize(

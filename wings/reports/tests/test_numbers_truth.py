@@ -300,22 +300,28 @@ def test_before_and_after_draw_both_means_and_mark_what_differs(tmp_path: Path) 
     picture = document.picture
     assert picture is not None
     magnitude, _, ratio_db, ratio_deg = drawn(picture).axes
-    ratio, true = comparison.found.overall.ratio, (plant(LINES.frequency_hz, 60) / plant(LINES.frequency_hz, 62))[0]
-    assert np.all(np.abs(ratio - true) < comparison.found.overall.bound)
-    for gid, one in (("before", comparison.found.overall.before), ("after", comparison.found.overall.after)):
+    ratio, true = (
+        comparison.differences.overall.ratio,
+        (plant(LINES.frequency_hz, 60) / plant(LINES.frequency_hz, 62))[0],
+    )
+    assert np.all(np.abs(ratio - true) < comparison.differences.overall.bound)
+    for gid, one in (
+        ("before", comparison.differences.overall.before),
+        ("after", comparison.differences.overall.after),
+    ):
         np.testing.assert_allclose(artists(magnitude, gid)[0].get_ydata(), 20 * np.log10(np.abs(one.value)))
     marked = np.concatenate([artists(ratio_db, "differs")[0].get_xdata(), artists(ratio_deg, "differs")[0].get_xdata()])
-    differing = LINES.frequency_hz[comparison.found.overall.differs]
+    differing = LINES.frequency_hz[comparison.differences.overall.differs]
     np.testing.assert_array_equal(marked, np.tile(differing, 2))
     assert 60 in differing
     (places,) = parts(document, Picture, "By place")
     dots = sum(len(a.get_xdata()) for axes in drawn(places).axes for a in artists(axes, "differs"))
-    assert dots == sum(int(p.difference.differs.sum()) for p in comparison.found.places)
+    assert dots == sum(int(p.difference.differs.sum()) for p in comparison.differences.places)
     done = livebode("compare", *paths, "--out", tmp_path / "both")
     assert done.code == 0, done.err
     (lines,) = parts(document, PrintedTable, "Frequency response")
     assert lines.headings[9] == "detectable %"
-    seen = comparison.found.overall.seen
+    seen = comparison.differences.overall.seen
     np.testing.assert_allclose([float(row[9]) for row in lines.rows], 100 * seen, rtol=0.05)
     assert ("smallest detectable change", f"≥ {100 * seen.max():.2g} %") in document.facts
     np.testing.assert_array_equal([line["detectable"] for line in comparison.plain()["lines"]], seen)

@@ -98,7 +98,7 @@ class LivebodeError(ValueError):
         return self.code.partition(".")[2] in self.temporary_codes or self.facts.get("errno") in _PASSING
 
     def at(self, place: str) -> Self:
-        """This error with the place where it was found in front of its message."""
+        """Error with the place where it was found in front of its message."""
         error = _rebuilt(type(self), self.__dict__)
         error.place = f"{place}: {self.place}" if self.place else place
         return error  # type: ignore[no-any-return]

@@ -46,6 +46,7 @@ class RecordError(LivebodeError):
         "not-removable": "The run cannot be removed.",
         "not-tracked": "The run does not name the channels that are needed.",
         "not-written": "The system refuses to write the run.",
+        "older-version": "A file of the run was written by an older version of livebode.",
         "proposal-invalid": "The stored proposal of livebode tune is damaged, or is not the one that the run gives.",
         "states-differ": "The unfinished run has the states of another version of livebode.",
         "too-large": "A file of the run is larger than a run writes it.",

@@ -31,7 +31,7 @@ const WHAT = {
 /** @type {Record<string, string>} */
 const PRIORITIES = { high: tr("high priority"), medium: tr("medium priority"), low: tr("low priority") };
 
-/** @param {Alarm | null} alarm */
+/** @param {{state: string} | null} alarm */
 export const open = (alarm) => alarm?.state === "unacknowledged" || alarm?.state === "returned";
 
 /**
@@ -51,10 +51,19 @@ export const chatters = ({ chatters_until_s: untilS }, nowS) => untilS !== null 
 function remarks({ alarm, count, first_s: firstS }, nowS) {
   const found = count > 1 ? [tr("{count} times since {time}", { count, time: moment(firstS) })] : [];
   if (!alarm) return found;
-  const { by, comment, shelf, returned_s: returnedS } = alarm;
+  const { returned_s: returnedS } = alarm;
   if (chatters(alarm, nowS)) found.unshift(tr("chattering: raised 3 times or more in a minute"));
   if (returnedS !== null && returnedS > alarm.since_s) found.push(tr("over since {time}", { time: moment(returnedS) }));
-  if (by) found.push(tr("acknowledged by {name}", { name: by }) + (comment ? `: ${comment}` : ""));
+  return [...found, ...persons(alarm)];
+}
+
+/**
+ * Who acted, and why.
+ *
+ * @param {Partial<Pick<Alarm, "by" | "comment" | "shelf">>} alarm
+ */
+export function persons({ by, comment, shelf }) {
+  const found = by ? [tr("acknowledged by {name}", { name: by }) + (comment ? `: ${comment}` : "")] : [];
   if (shelf)
     found.push(
       tr("shelved by {name} until {time}: {reason}", {
@@ -66,6 +75,30 @@ function remarks({ alarm, count, first_s: firstS }, nowS) {
   return found;
 }
 
+/** @param {{state: string, priority: string}} alarm */
+export function chip({ state, priority }) {
+  const [sign, words] = STATES[state];
+  const text = [`${sign} ${words}`, PRIORITIES[priority]].filter(Boolean).join(" · ");
+  return element("span", { class: `state ${state} ${priority}` }, text);
+}
+
+/** @param {Act} act */
+export const actButton = ({ label, words, act, disabled }, tabindex = -1) =>
+  element(
+    "button",
+    {
+      type: "button",
+      tabindex,
+      "aria-label": label,
+      disabled: disabled ?? false,
+      onclick: (event) => {
+        event.stopPropagation();
+        act();
+      },
+    },
+    words,
+  );
+
 /**
  * @param {string} cause
  * @param {string} look
@@ -75,28 +108,12 @@ function remarks({ alarm, count, first_s: firstS }, nowS) {
  * @param {Act[]} acts
  */
 function row(cause, look, timeS, momentS, words, acts) {
-  const buttons = acts.map(({ label, words: text, act, disabled }) =>
-    element(
-      "button",
-      {
-        type: "button",
-        tabindex: -1,
-        "aria-label": label,
-        disabled: disabled ?? false,
-        onclick: (event) => {
-          event.stopPropagation();
-          act();
-        },
-      },
-      text,
-    ),
-  );
   return element(
     "div",
     { role: "row", tabindex: -1, class: look, "data-cause": cause, "data-time": momentS },
     element("time", { role: "gridcell" }, moment(timeS)),
     element("p", { role: "gridcell" }, ...words),
-    element("span", { role: "gridcell", class: "acts" }, ...buttons),
+    element("span", { role: "gridcell", class: "acts" }, ...acts.map((act) => actButton(act))),
   );
 }
 
@@ -108,18 +125,7 @@ function row(cause, look, timeS, momentS, words, acts) {
 export function noticeRow(notice, nowS, acts) {
   const { alarm, kind, cause, count, seen, last_s: lastS } = notice;
   const state = alarm?.state ?? "normal";
-  const [sign, words] = STATES[state];
-  const chip =
-    alarm && state !== "normal"
-      ? [
-          element(
-            "span",
-            { class: `state ${state} ${alarm.priority}` },
-            `${sign} ${words} · ${PRIORITIES[alarm.priority]}`,
-          ),
-          " ",
-        ]
-      : [];
+  const shown = alarm && state !== "normal" ? [chip(alarm), " "] : [];
   const look = `${open(alarm) ? "alarm" : ""}${seen >= count ? " seen" : ""}`;
   return row(
     cause,
@@ -127,7 +133,7 @@ export function noticeRow(notice, nowS, acts) {
     lastS,
     alarm?.at_s ?? lastS,
     [
-      ...chip,
+      ...shown,
       element("span", { class: "kind" }, worded(kind)),
       worded(notice.words),
       ...remarks(notice, nowS).map((text) => element("span", { class: "often" }, text)),

@@ -11,7 +11,6 @@ import { mostlyNoise, NoiseHold } from "./noise-hold.js";
 import { panel } from "./panel.js";
 import { Tooltip } from "./tooltip.js";
 import { View } from "./view.js";
-import { tried } from "./whatif.js";
 import { scaled, shifted, Zoom } from "./zoom.js";
 
 /** @import { Operation } from "./arithmetic.js" */
@@ -20,8 +19,7 @@ import { scaled, shifted, Zoom } from "./zoom.js";
 /** @import { Extremum } from "./extrema.js" */
 /** @import { Mode } from "./fitted.js" */
 /** @import { Mark } from "./marks.js" */
-/** @import { Annotation, Curves, Found, Frame, Quantity, Run } from "./messages.js" */
-/** @import { Factor } from "./trial.js" */
+/** @import { Annotation, Curves, Derived, Found, Frame, Quantity, Run } from "./messages.js" */
 
 const FEW_LINES = 40;
 const STEP = 0.7; // of a zoom by key or button
@@ -64,12 +62,8 @@ export class Bode {
     this.laid = [];
     /** @type {Operation | null} */
     this.operation = operationOf(chosen("bode-operation", ""));
-    /** What is tried on the loop: C at the frequencies of a curve. @type {((curve: Curve) => Factor) | null} */
-    this.factor = null;
-    /** Margins of what is tried in this drawing. @type {Mark[] | null} */
-    this.triedMarks = null;
-    /** Whether the sliders are beside the plot. */
-    this.trying = false;
+    /** What an addition of the page computes from the measured curve. @type {Derived | null} */
+    this.derived = null;
     /** @type {Extremum | null} */
     this.extremum = null;
     /** @type {Annotation[]} */
@@ -267,10 +261,8 @@ export class Bode {
       if (result) this.curves.result = result;
     }
     this.drop("what if");
-    this.triedMarks = null;
-    const { measured: known } = this.curves;
-    const other =
-      this.factor && known && !this.operation ? tried(known, known.frame?.quantity ?? null, this.factor(known)) : null;
+    const { measured: known } = this.curves,
+      other = known && !this.operation ? this.derived?.curve(known) : null;
     if (other) this.curves["what if"] = other;
     if (this.layout().join() !== this.laid.join()) this.build();
     const ratio = this.operation?.kind === "ratio";

@@ -1,9 +1,8 @@
 // @ts-check
 // The web socket: reconnects with increasing delay, sends requests of the page, distributes the messages.
-import { framesOf } from "./frames.js";
 import { worded } from "./worded.js";
 
-/** @import { Frame, News, ClientRequest } from "./messages.js" */
+/** @import { News, ClientRequest } from "./messages.js" */
 
 const PAUSE_MS_MAX = 8000;
 // The page of one run of many is /run/NAME/, and its requests are below that.
@@ -12,18 +11,22 @@ const HERE = new URL(".", location.href).pathname;
 /** @param {string} path with a leading slash */
 export const below = (path) => HERE + path.slice(1);
 
+/**
+ * @template {object} [Sent=News] what the server sends as JSON
+ * @template {object} [Request=ClientRequest] what the page asks for
+ */
 export class Link {
   /**
    * @param {object} listeners
-   * @param {(news: News) => void} listeners.onNews
-   * @param {(frame: Frame) => void} listeners.onFrame
+   * @param {(news: Sent) => void} listeners.onNews
+   * @param {(data: ArrayBuffer) => void} listeners.onBytes
    * @param {(up: boolean) => void} listeners.onState
    */
-  constructor({ onNews, onFrame, onState }) {
+  constructor({ onNews, onBytes, onState }) {
     this.onNews = onNews;
-    this.onFrame = onFrame;
+    this.onBytes = onBytes;
     this.onState = onState;
-    /** @type {Map<string, ClientRequest>} requests to repeat after a reconnection, by kind */
+    /** @type {Map<string, Request>} requests to repeat after a reconnection, by kind */
     this.repeated = new Map();
     this.pauseMs = 250;
     this.socket = this.connect();
@@ -41,7 +44,7 @@ export class Link {
     };
     socket.onmessage = ({ data }) => {
       if (typeof data === "string") this.onNews(JSON.parse(data));
-      else for (const frame of framesOf(data)) this.onFrame(frame);
+      else this.onBytes(data);
     };
     socket.onclose = (event) => {
       this.onState(false);
@@ -59,7 +62,7 @@ export class Link {
   }
 
   /**
-   * @param {ClientRequest} request
+   * @param {Request} request
    * @param {string} [keep] name under which the request is repeated after a reconnection; a later one replaces it
    */
   request(request, keep) {

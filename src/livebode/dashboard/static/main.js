@@ -1,5 +1,6 @@
 // @ts-check
 // The page: messages from the server go to the panels, actions of the person go to the server.
+import { ADDITIONS } from "./additions.js";
 import { chosen, enter, remember } from "./address.js";
 import { alarmMoment } from "./alarmmoment.js";
 import { Bode } from "./bode.js";
@@ -9,7 +10,7 @@ import { curvesMenu } from "./curves-menu.js";
 import { describe } from "./describe.js";
 import { Events } from "./events.js";
 import { delayMs, marginMarks, modes } from "./fitted.js";
-import { QUANTITIES } from "./frames.js";
+import { framesOf, QUANTITIES } from "./frames.js";
 import { health } from "./health.js";
 import { tr } from "./language.js";
 import { legend } from "./legend.js";
@@ -36,7 +37,6 @@ import { Trends } from "./trends.js";
 import { lamp } from "./verdict.js";
 import { viewMenu } from "./view-menu.js";
 import { Wall } from "./wall.js";
-import { WhatIfCard } from "./whatif-card.js";
 import { worded } from "./worded.js";
 import { named } from "./words.js";
 import { zoneChoice } from "./zone.js";
@@ -174,18 +174,23 @@ const link = new Link({
     }
     status();
   },
-  onFrame: (frame) => {
-    if (!page.facts?.begun || frame.axis !== page.axis || frame.quantity !== page.quantity) return;
-    if (frame.kind === "rows") {
-      page.rows.take(frame);
-      page.dirty.add("rows");
-      return;
-    }
-    if (!frame.kind.startsWith("reference") && timeline.atS !== null) return;
-    bode.take(frame);
-    page.dirty.add("bode");
+  onBytes: (data) => {
+    for (const frame of framesOf(data)) takeFrame(frame);
   },
 });
+
+/** @param {import("./messages.js").Frame} frame */
+function takeFrame(frame) {
+  if (!page.facts?.begun || frame.axis !== page.axis || frame.quantity !== page.quantity) return;
+  if (frame.kind === "rows") {
+    page.rows.take(frame);
+    page.dirty.add("rows");
+    return;
+  }
+  if (!frame.kind.startsWith("reference") && timeline.atS !== null) return;
+  bode.take(frame);
+  page.dirty.add("bode");
+}
 
 /**
  * An answer to an earlier request; it would undo the choice of another axis.
@@ -290,7 +295,7 @@ function begin({ facts, axes, trends }) {
     map.begin(facts, page.schedule);
     fill();
     saved.fetch();
-    page.dirty.add("trial");
+    page.dirty.add("additions");
   }
   const gone = other && references.stored.size > 0;
   if (gone) references.releaseAll();
@@ -300,7 +305,7 @@ function begin({ facts, axes, trends }) {
   mapOver.disable("position", facts.schedule ? "" : NO_POSITION);
   drawLegend();
   matrix.begin(facts);
-  whatIf.begin();
+  for (const part of Object.values(additions)) part.begin();
   parameters.begin(trends);
   margins.begin(trends, whyNoMargins(facts));
   marginTrends.begin(trends);
@@ -413,7 +418,7 @@ function draw(now) {
     return true;
   };
   if (due("bode", 0)) bode.draw();
-  if (due("trial", 0)) whatIf.draw();
+  if (due("additions", 0)) for (const part of Object.values(additions)) part.draw();
   if (due("read", TEXT_MS) && page.read) readout($("readout"), ...page.read, page.schedule, bode);
   if (due("rows", TRACK_MS)) drawRows(now);
   if (page.tab === "map" && page.seen && due("map", timeline.atS === null ? MAP_MS : 0)) {
@@ -452,12 +457,14 @@ const matrix = new Matrix(page, timeline, {
   },
   complain,
 });
-const whatIf = new WhatIfCard(page, bode, { watch, complain });
+const additions = Object.fromEntries(
+  Object.entries(ADDITIONS).map(([name, added]) => [name, added(page, bode, { watch, complain })]),
+);
 const operator = () => page.facts?.role === "operator";
 const curves = curvesMenu($("bode-curves"), $("bode-curves-panel"), { bode, references, saved, operator, complain });
 const showClock = zoneChoice($("clock", HTMLSelectElement));
 const lost = new Lost($("lost"));
 describe(page, { bode, tracking, map, trends: [parameters, marginTrends] });
 onClock(newClock);
-window.livebode = { page, ...parts, parameters, margins, marginTrends, saved, zoom, whatIf, matrix };
+window.livebode = { page, ...parts, parameters, margins, marginTrends, saved, zoom, matrix, ...additions };
 requestAnimationFrame(draw);

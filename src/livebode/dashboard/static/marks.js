@@ -5,7 +5,6 @@ import { tr } from "./language.js";
 import { look } from "./looks.js";
 import { drawingPicture } from "./picture.js";
 import { colour } from "./theme.js";
-import { triedMarks } from "./whatif-marks.js";
 import { plain } from "./words.js";
 
 /** @import { Bode } from "./bode.js" */
@@ -117,10 +116,10 @@ export function label({ ctx, px, u }, text, x, y, paint) {
   ctx.fillText(text, at + 4 * px, middle + 11.2 * px);
 }
 
-/** Margins of the fitted model, and those of what is tried; alone beside the sliders, where both would hide the curves. @param {Bode} bode */
-export function marksOf(bode) {
-  const tried = triedMarks(bode);
-  return bode.trying && tried.length ? tried : [...bode.known.margins(), ...tried];
+/** Margins of the fitted model, and those of the derived curve; alone where both would hide the curves. @param {Bode} bode */
+export function marksOf({ derived, known }) {
+  const marks = derived?.marks() ?? [];
+  return derived?.alone && marks.length ? marks : [...known.margins(), ...marks];
 }
 
 /** @param {Mark} mark */
@@ -136,8 +135,8 @@ function drawLoop(sheet) {
   if (index === PHASE)
     for (let deg = 360 * Math.ceil((min - 180) / 360) + 180; deg <= max; deg += 360)
       horizontal(sheet, deg, `${deg < 0 ? "−" : ""}${Math.abs(deg)}°`);
-  // On a telephone the line above the plot has the margins of what is tried: words would hide the curves.
-  const wordless = bode.trying && u.bbox.width < NARROW * px;
+  // On a telephone the addition has the margins in words above the plot: here they would hide the curves.
+  const wordless = bode.derived?.alone && u.bbox.width < NARROW * px;
   let outside = 0;
   for (const mark of marksOf(bode)) {
     if (!inSight(sheet, mark.hz)) {

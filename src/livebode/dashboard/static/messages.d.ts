@@ -1,4 +1,7 @@
-// Types of what the server sends (state.py, notices.py, trends.py, client.py) and of what the panels share.
+// Types of what the server sends (state.py, notices.py, recent.py, browser_socket.py) and of what the panels share.
+import type { Bode } from "./bode.js";
+import type { Curve } from "./curves.js";
+import type { Mark } from "./marks.js";
 import type { Rows } from "./rows.js";
 
 export type Quantity = "plant" | "open loop" | "closed loop" | "sensitivity";
@@ -80,7 +83,7 @@ export interface MatrixNames {
   first_axis: number;
 }
 
-/** One matrix; see matrix_answer.py. */
+/** One matrix; see matrix_group.py. */
 export interface MatrixAnswer extends MatrixNames {
   frequency_hz: number[];
   time_s: number;
@@ -200,7 +203,7 @@ export interface Alarm {
   shelf: { by: string; until_s: number; reason: string } | null;
 }
 
-/** A change of an alarm; see alarm_history.py. */
+/** A change of an alarm; see alarm.py. */
 export interface Transition {
   number: number;
   time_s: number;
@@ -296,87 +299,29 @@ export interface SavedCurves {
   annotations: Annotation[];
 }
 
-/** A curve times a parameter to a power; without a name the curve alone. See tuning/feedback_parts.py. */
-export interface LoopTerm {
-  name: string;
-  power: number;
-  re: number[];
-  im: number[];
+/** What an addition computes from the measured curve: the curve `what if`, and its margins. */
+export interface Derived {
+  /** null: there is none */
+  curve(measured: Curve): Curve | null;
+  marks(): Mark[];
+  /** The margins of the fitted model are not shown beside these. */
+  readonly alone: boolean;
 }
 
-/** F = gain·(sum of the terms)·(1 + outer). */
-export interface LoopParts {
-  terms: LoopTerm[];
-  outer: LoopTerm | null;
+/** A part that a plug-in adds to the page. */
+export interface AddedPart {
+  /** Another axis or run is shown, or other lines. */
+  begin(): void;
+  /** Once a frame, while `page.dirty` has "additions". */
+  draw(): void;
 }
 
-/** The plant on a grid of frequencies with the radius that contains it; `known` of them are not above the lines. */
-export interface LoopBand {
-  frequency_hz: number[];
-  known: number;
-  lines_hz: number[];
-  dropped: number;
-  confidence: number;
-  /** `rise`: above the lines, the factor by which a resonance that they permit exceeds the fall. */
-  places: { re: number[]; im: number[]; radius: number[]; rise: number[] }[];
-  parts: LoopParts;
-}
-
-/** What a trial of other gains and filters needs; see loop_trial.py. */
-export interface LoopFacts {
-  described: boolean;
-  /** of `livebode check-loop` */
-  verdict: "as described" | "one change" | "not explained" | "not checked";
-  sentence: string;
-  /** Key of each parameter in the configuration. */
-  tables: Record<string, string>;
-  values: Record<string, number>;
-  rate_hz: number;
-  /** Grid of the page. */
-  frequency_hz: number[];
-  parts: LoopParts;
-  band: LoopBand | null;
-  band_why_not: Words;
-  /** Of `livebode tune`; without gains where the run has only its filters. */
-  proposed: {
-    gains: Record<string, number> | null;
-    notches: { hz: number; depth_db: number; damping: number }[];
-    low_passes_hz: number[];
-  } | null;
-}
-
-export type LoopAnswer = (LoopFacts & { why_not: "" }) | { why_not: Words; described?: undefined };
-
-/** A step with its band; without one where a plant within the bounds may be unstable. */
-export interface StepBand {
-  value: number[];
-  low: number[] | null;
-  high: number[] | null;
-}
-
-/** Rms of the plant input for white noise of 1 at the output, and its range over all plants within the bounds. */
-export interface NoiseRange {
-  value: number;
-  low: number | null;
-  high: number | null;
-}
-
-/** Without disturbance and noise where the run measured L and its loop is not described. */
-export interface StepsSide {
-  reference: StepBand;
-  disturbance: StepBand | null;
-  noise: NoiseRange | null;
-}
-
-/** Predicted steps of a trial; see trial_steps.py. A side that is null is unstable. */
-export interface StepsAnswer {
-  time_ms: number[];
-  before: StepsSide | null;
-  after: StepsSide | null;
-  /** Of the plant. */
-  unit: string;
-  places: number;
-}
+/** Called once, when the page is complete. */
+export type Addition = (
+  page: Page,
+  bode: Bode,
+  actions: { watch: (quantity: Quantity) => void; complain: (text: string) => void },
+) => AddedPart;
 
 /** What the page shows, and what is to be drawn again (`dirty`). */
 export interface Page {

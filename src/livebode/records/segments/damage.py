@@ -43,14 +43,17 @@ class Damage:
     @classmethod
     def of(cls, values: Mapping[str, Any]) -> Damage:
         """From `to_json`; ValueError, TypeError or KeyError for other data."""
-        begin, end = (None if (at := values[name]) is None else (int(at[0]), float(at[1])) for name in ("begin", "end"))
+        begin, end = (
+            None if (moment := values[name]) is None else (int(moment[0]), float(moment[1]))
+            for name in ("begin", "end")
+        )
         rows = {str(table): int(number) for table, number in values["rows"].items()}
         return cls(int(values["size_bytes"]), begin, end, rows, values.get("at_least") is True)
 
     def to_json(self) -> dict[str, Any]:
-        begin, end = (None if at is None else list(at) for at in (self.begin, self.end))
-        rest = {"rows": dict(self.rows), "at_least": self.at_least}
-        return {"size_bytes": self.size_bytes, "begin": begin, "end": end, **rest}
+        begin, end = (None if moment is None else list(moment) for moment in (self.begin, self.end))
+        losses = {"rows": dict(self.rows), "at_least": self.at_least}
+        return {"size_bytes": self.size_bytes, "begin": begin, "end": end, **losses}
 
     @property
     def sentence(self) -> str:

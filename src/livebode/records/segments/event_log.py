@@ -51,7 +51,7 @@ class EventLog:
         self._emit(event)
         return event
 
-    def take_given_up(self) -> int:
+    def drain_given_up(self) -> int:
         given_up, self._given_up = self._given_up, 0
         return given_up
 

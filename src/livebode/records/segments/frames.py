@@ -45,42 +45,42 @@ def frames(data: bytes) -> Iterator[Frame]:
 
     A frame whose writing was interrupted is torn: only its beginning exists, at the very end. Anything else is damaged.
     """
-    view, at = memoryview(data), 0
-    while at < len(view):
-        kind, table, length, check = _header(view, at) or (0, 0, 0, 0)
-        end = at + _SIZE + length
+    view, position = memoryview(data), 0
+    while position < len(view):
+        kind, table, length, check = _header(view, position) or (0, 0, 0, 0)
+        end = position + _SIZE + length
         if not kind:
-            end = _next_header(data, at + 1)
-            if end == len(view) and _may_be_torn(view[at:]):
+            end = _next_header(data, position + 1)
+            if end == len(view) and _may_be_torn(view[position:]):
                 return
-            yield Frame(0, 0, None, at, end)
+            yield Frame(0, 0, None, position, end)
         elif end > len(view):
             return
         else:
-            payload = view[at + _SIZE : end]
-            yield Frame(kind, table, payload if zlib.crc32(payload) == check else None, at, end)
-        at = end
+            payload = view[position + _SIZE : end]
+            yield Frame(kind, table, payload if zlib.crc32(payload) == check else None, position, end)
+        position = end
 
 
-def _header(view: memoryview, at: int) -> tuple[int, int, int, int] | None:
+def _header(view: memoryview, position: int) -> tuple[int, int, int, int] | None:
     """Kind, table, length and checksum of the frame that begins here; None without an intact header."""
-    if at + _SIZE > len(view):
+    if position + _SIZE > len(view):
         return None
-    header = view[at : at + _HEADER.size]
+    header = view[position : position + _HEADER.size]
     magic, kind, table, length, check = _HEADER.unpack(header)
-    if magic != _MAGIC or not kind or _CHECK.unpack_from(view, at + _HEADER.size)[0] != zlib.crc32(header):
+    if magic != _MAGIC or not kind or _CHECK.unpack_from(view, position + _HEADER.size)[0] != zlib.crc32(header):
         return None
     return kind, table, length, check
 
 
-def _next_header(data: bytes, at: int) -> int:
+def _next_header(data: bytes, position: int) -> int:
     view = memoryview(data)
-    while (at := data.find(_MAGIC, at)) >= 0:
-        if _header(view, at):
-            return at
-        at += 1
+    while (position := data.find(_MAGIC, position)) >= 0:
+        if _header(view, position):
+            return position
+        position += 1
     return len(data)
 
 
-def _may_be_torn(rest: memoryview) -> bool:
-    return len(rest) < _SIZE and bytes(rest[: len(_MAGIC)]) == _MAGIC[: len(rest)]
+def _may_be_torn(remainder: memoryview) -> bool:
+    return len(remainder) < _SIZE and bytes(remainder[: len(_MAGIC)]) == _MAGIC[: len(remainder)]

@@ -13,11 +13,11 @@ from pathlib import Path
 from typing import Any
 
 from livebode.core import RecordError, replace_file, sync_directory
+from livebode.records.column_table import ColumnTable
 from livebode.records.inside import check_folder, open_read
 from livebode.records.json_format import check_version, format_of
 from livebode.records.segments.damage import Damage
 from livebode.records.segments.frames import COMMIT, FORMAT, ROWS, TABLE, Frame, frames, to_frame
-from livebode.records.table_file import ColumnTable
 from livebode.tables import Schema, Table, from_message, schema_from_message, schema_to_message
 
 FOLDER, ASIDE = "open", "damaged"
@@ -67,8 +67,8 @@ class Commit:
     @classmethod
     def of(cls, payload: memoryview) -> Commit:
         """The commit in this frame; ValueError, TypeError or KeyError if a run cannot have written it."""
-        at = _LENGTH.size + _LENGTH.unpack_from(payload)[0]
-        head = json.loads(bytes(payload[_LENGTH.size : at]))
+        position = _LENGTH.size + _LENGTH.unpack_from(payload)[0]
+        head = json.loads(bytes(payload[_LENGTH.size : position]))
         whole = [head["sample"], head["events_bytes"], *head["rows"].values()]
         if any(type(number) is not int for number in whole) or not all(map(math.isfinite, (head["time_s"], *whole))):
             raise ValueError("the commit is invalid")
@@ -77,8 +77,8 @@ class Commit:
             raise ValueError("the events are invalid")
         states = {}
         for name, length in head.pop("states").items():
-            states[name] = bytes(payload[at : at + length])
-            at += length
+            states[name] = bytes(payload[position : position + length])
+            position += length
         return cls(**head, states=states, waiting=tuple(waiting))
 
 
@@ -128,10 +128,10 @@ class Journal:
         OSError
             If it cannot be read.
         """
-        found = list(frames(_whole(run, name_of(number))))
-        _check_version(run / name_of(number), found)
+        sequence = list(frames(_whole(run, name_of(number))))
+        _check_version(run / name_of(number), sequence)
         try:
-            return cls()._over(iter(found), after)
+            return cls()._over(iter(sequence), after)
         except (ValueError, KeyError, TypeError, RecursionError, struct.error):
             raise RecordError(
                 "unexpected-content",
@@ -140,9 +140,9 @@ class Journal:
                 path=str(run / name_of(number)),
             ) from None
 
-    def _over(self, found: Iterator[Frame], after: Callable[[], Commit | None]) -> Journal:
+    def _over(self, sequence: Iterator[Frame], after: Callable[[], Commit | None]) -> Journal:
         tables: dict[int, tuple[str, Schema]] = {}
-        for frame in found:
+        for frame in sequence:
             if frame.payload is None or (frame.kind == ROWS and frame.table not in tables):
                 # After a damaged commit there are only rows of one that was still being written.
                 first = not self._broken_bytes
@@ -229,8 +229,8 @@ def _whole(run: Path, name: str) -> bytes:
         return file.read(about.st_size)
 
 
-def _check_version(path: Path, found: list[Frame]) -> None:
-    for frame in found:
+def _check_version(path: Path, sequence: list[Frame]) -> None:
+    for frame in sequence:
         if frame.kind == FORMAT and frame.payload is not None:
             with contextlib.suppress(json.JSONDecodeError, UnicodeDecodeError, AttributeError, RecursionError):
                 check_version(path, "journal", json.loads(bytes(frame.payload)).get("version"))
@@ -284,8 +284,8 @@ def numbers(run: Path) -> list[int]:
     """Numbers of the existing journals, ascending."""
     check_folder(run, name_of(1))
     names = {path.name for path in (run / FOLDER).glob("*.journal") if path.stem.isdecimal() and path.stem.isascii()}
-    found = sorted(int(name.removesuffix(".journal")) for name in names if len(name) < 20)
-    return [number for number in found if Path(name_of(number)).name in names]
+    ascending = sorted(int(name.removesuffix(".journal")) for name in names if len(name) < 20)
+    return [number for number in ascending if Path(name_of(number)).name in names]
 
 
 def last_commit(run: Path) -> Commit | None:

@@ -35,9 +35,9 @@ def from_line(line: bytes) -> dict[str, Any]:
     Traceback (most recent call last):
     ValueError: the checksum of '{"kind": "gab"}' is wrong
     """
-    text, _, rest = line.decode("utf-8").rstrip("\n").rpartition(_KEY)
+    text, _, checksum = line.decode("utf-8").rstrip("\n").rpartition(_KEY)
     text += "}"
-    if rest != f'{_checksum(text)}"}}':
+    if checksum != f'{_checksum(text)}"}}':
         raise ValueError(f"the checksum of {text[:80]!r} is wrong")
     try:
         value = json.loads(text)
@@ -60,21 +60,21 @@ def in_line(line: bytes) -> Iterator[dict[str, Any] | bytes]:
         yield from_line(line)
         return
     except ValueError:
-        rest, at = line.rstrip(b"\n"), 0
-    for end in dict.fromkeys([*(match.end() for match in _END.finditer(rest)), len(rest)]):
-        yield from _pieces(rest[at:end])
-        at = end
+        remainder, position = line.rstrip(b"\n"), 0
+    for end in dict.fromkeys([*(match.end() for match in _END.finditer(remainder)), len(remainder)]):
+        yield from _pieces(remainder[position:end])
+        position = end
 
 
 def _pieces(piece: bytes) -> Iterator[dict[str, Any] | bytes]:
     for skipped in (0, 1):  # 1: after a damaged line end
         try:
-            found = from_line(piece[skipped:])
+            value = from_line(piece[skipped:])
         except ValueError:
             continue
         if skipped:
             yield piece[:skipped]
-        yield found
+        yield value
         return
     yield piece
 

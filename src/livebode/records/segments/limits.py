@@ -1,4 +1,4 @@
-"""Sizes and disk budget of a record in segments."""
+"""Sizes and disk budget of a record with a journal."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ JOURNALS = 3
 
 @dataclass(frozen=True)
 class SegmentLimits:
-    """Sizes of a record in segments.
+    """Sizes of a record with a journal.
 
     Attributes
     ----------

@@ -22,26 +22,50 @@ NAME = "manifest.jsonl"
 TIERS = ("responses_1s", "responses_1min", "responses_1h")
 TABLES = ("responses", "covariance", "parameters", "samples", *TIERS)
 _SHA256 = re.compile("[0-9a-f]{64}")
-SEGMENT_NAME = re.compile(r"[a-z0-9_]+/(\d{6,9})(?:-(\d{6,9}))?\.parquet")
-_COUNTS = ("rows", "first_sample", "last_sample", "size_bytes")
+SEGMENT_NAME = re.compile(r"[a-z0-9_]+(?:/(\d{6,9})(?:-(\d{6,9}))?)?\.parquet")
+
+
+@dataclass(frozen=True)
+class SegmentPart:
+    """Consecutive bytes of a segment: a row group, or, with no rows, the bytes after the last one."""
+
+    rows: int
+    size_bytes: int
+    sha256: str
+
+    @property
+    def sound(self) -> bool:
+        """Whether a run can have written it."""
+        numbers = type(self.rows) is int and type(self.size_bytes) is int
+        return numbers and self.rows >= 0 < self.size_bytes and bool(_SHA256.fullmatch(self.sha256))
 
 
 @dataclass(frozen=True)
 class Segment:
-    """A closed segment: one table's rows from one journal, or from several that were merged, as a Parquet file.
+    """A closed segment: rows of one table as a Parquet file.
 
-    `name` is its path in the run's directory; `first_s` and `last_s` are the times of its first and last row.
+    Its rows are from one journal, from several that were merged, or, with the name of the table, those of a whole run.
+    `name` is its path in the run's directory; `first_sample`, `last_sample`, `first_s` and `last_s` are the extremes of
+    its rows, 0 if it has none; `parts` are its row groups and the end of the file.
     """
 
     name: str
     table: str
-    rows: int
     first_sample: int
     last_sample: int
     first_s: float
     last_s: float
-    size_bytes: int
-    sha256: str
+    parts: tuple[SegmentPart, ...]
+
+    @property
+    def rows(self) -> int:
+        """Number of its rows."""
+        return sum(part.rows for part in self.parts)
+
+    @property
+    def size_bytes(self) -> int:
+        """Size of its file."""
+        return sum(part.size_bytes for part in self.parts)
 
     @property
     def numbers(self) -> tuple[int, int]:
@@ -51,18 +75,20 @@ class Segment:
     @classmethod
     def of(cls, first: int, last: int, values: Mapping[str, Any]) -> Segment:
         """The segment of these journals in a line; ValueError if a run cannot have written it."""
-        found = cls(**values)
-        numbers = [*(getattr(found, name) for name in _COUNTS), found.first_s, found.last_s]
+        parts = tuple(SegmentPart(**part) for part in values["parts"])
+        segment = cls(**{**values, "parts": parts})
+        samples, times_s = (segment.first_sample, segment.last_sample), (segment.first_s, segment.last_s)
         sound = (
-            found.table in TABLES
-            and found.name == name_of(found.table, first, last)
-            and all(type(value) is int for value in numbers[:4])
-            and all(type(value) in (int, float) and math.isfinite(value) for value in numbers)
-            and _SHA256.fullmatch(found.sha256)
+            segment.table in TABLES
+            and segment.name in (name_of(segment.table, first, last), f"{segment.table}.parquet")
+            and all(type(value) is int for value in samples)
+            and all(type(value) in (int, float) and math.isfinite(value) for value in (*samples, *times_s))
+            and all(part.sound for part in parts)
+            and all(part.rows for part in parts[:-1])
         )
-        if not sound or found.rows < 1 or found.size_bytes < 1:
+        if not sound or not parts or parts[-1].rows:
             raise ValueError("the segment is invalid")
-        return found
+        return segment
 
 
 @dataclass(frozen=True)
@@ -115,18 +141,18 @@ class Manifest:
 
     @classmethod
     def read(cls, run: Path) -> Manifest:
-        """All intact lines; OSError if there is no file, RecordError if a newer livebode wrote it."""
+        """All intact lines; OSError if there is no file, RecordError if it has another version."""
         data = read_bytes(run, NAME)
         length = data.rfind(b"\n") + 1
-        found, before = cls(length=length, torn=data[length:]), b""
+        manifest, before = cls(length=length, torn=data[length:]), b""
         for number, line in enumerate(data.splitlines(keepends=True), 1):
             if line != before:  # each is written twice
-                found._take(line, number)
+                manifest._read_line(line, number)
             before = line
-        check_version(run / NAME, "manifest", found.version)
-        found.gone += [segment for segment in found.segments if segment.name in found._removed]
-        found.segments = [segment for segment in found.segments if segment.name not in found._removed]
-        return found
+        check_version(run / NAME, "manifest", manifest.version)
+        manifest.gone += [segment for segment in manifest.segments if segment.name in manifest._removed]
+        manifest.segments = [segment for segment in manifest.segments if segment.name not in manifest._removed]
+        return manifest
 
     def is_closed(self, number: int) -> bool:
         """Whether this journal has become segments."""
@@ -139,12 +165,12 @@ class Manifest:
 
     def place(self, name: str) -> tuple[Segment, int] | None:
         """The segment that has the rows of a merged one now, and the number of its rows before them."""
-        before, found = 0, None
+        before, segment = 0, None
         while (step := self.merged.get(name)) is not None:
-            found, name, before = step[0], step[0].name, before + step[1]
-        return None if found is None or found.name in self._removed else (found, before)
+            segment, name, before = step[0], step[0].name, before + step[1]
+        return None if segment is None or segment.name in self._removed else (segment, before)
 
-    def _take(self, line: bytes, number: int) -> None:
+    def _read_line(self, line: bytes, number: int) -> None:
         for value in in_line(line):
             try:
                 if isinstance(value, bytes):
@@ -182,16 +208,16 @@ class Manifest:
         until = value["closed_until"]
         if type(until) is not int or not 0 <= until < 10**9:
             raise ValueError
-        segments = [Segment.of(*segment_numbers(one["name"]), one) for one in value["segments"]]
-        retained = [Retained.of(int(one["number"]), one) for one in value["retained"]]
+        segments = [Segment.of(*segment_numbers(values["name"]), values) for values in value["segments"]]
+        retained = [Retained.of(int(values["number"]), values) for values in value["retained"]]
         by_name = {segment.name: segment for segment in segments}
         for new, name, rows in value["places"]:
             self.merged[str(name)] = by_name[new], int(rows)
         self.segments, self.retained, self.until, self.closed = segments, retained, until, set()
 
     def _merge(self, names: Sequence[str], values: Mapping[str, Any]) -> None:
-        at = {segment.name: number for number, segment in enumerate(self.segments)}
-        parts = [self.segments[at[name]] for name in names]
+        index = {segment.name: number for number, segment in enumerate(self.segments)}
+        parts = [self.segments[index[name]] for name in names]
         segment = Segment.of(parts[0].numbers[0], parts[-1].numbers[1], values)
         if len(parts) < 2 or {part.table for part in parts} != {segment.table}:
             raise ValueError
@@ -201,9 +227,9 @@ class Manifest:
             before += part.rows
         if before != segment.rows:
             raise ValueError
-        self.segments[at[names[0]]] = segment
+        self.segments[index[names[0]]] = segment
         self.gone += parts
-        self.segments = [one for one in self.segments if one.name not in self.merged]
+        self.segments = [segment for segment in self.segments if segment.name not in self.merged]
 
     @property
     def missing(self) -> list[tuple[int, int]]:
@@ -237,11 +263,12 @@ def name_of(table: str, first: int, last: int) -> str:
 
 
 def segment_numbers(name: str) -> tuple[int, int]:
-    """The numbers in `name_of`; ValueError for another name."""
-    found = SEGMENT_NAME.fullmatch(name)
-    if found is None:
+    """The numbers in `name_of`, 1 and 1 for the name of a table; ValueError for another name."""
+    numbers = SEGMENT_NAME.fullmatch(name)
+    if numbers is None:
         raise ValueError(f"{name!r} is not the name of a segment")
-    return int(found[1]), int(found[2] or found[1])
+    first = int(numbers[1] or 1)
+    return first, int(numbers[2] or first)
 
 
 def short_line(
@@ -254,7 +281,7 @@ def short_line(
 
     `places` are those of `Manifest.merged` that a reader may still need: new name, old name, number of rows before.
     """
-    damaged = [{"number": one.number} | _to_json(one) for one in retained]
+    damaged = [{"number": damaged_journal.number} | _to_json(damaged_journal) for damaged_journal in retained]
     line = {"closed_until": until, "segments": [asdict(segment) for segment in segments]}
     return to_line(line | {"retained": damaged, "places": list(places)}) * 2
 

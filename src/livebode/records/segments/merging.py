@@ -12,13 +12,13 @@ from pathlib import Path
 
 from livebode.records.inside import is_folder
 from livebode.records.segments.manifest import SEGMENT_NAME, TABLES, Manifest, Segment, segment_numbers
-from livebode.records.segments.segment_file import open_segment
+from livebode.records.segments.segment_file import SegmentFile
+from livebode.records.segments.segment_writer import GROUP_ROWS
 from livebode.tables import Table
 
 _MERGED_MAX = 4 << 20
 _BUDGET_SHARE = 32  # the budget removes whole segments
 _FAN_IN = 16
-_GROUP_ROWS = 1 << 15
 
 
 def merged_bytes_max(budget_bytes: int | None) -> int:
@@ -46,7 +46,10 @@ def rows_to_merge(run: Path, parts: list[Segment]) -> list[Table] | None:
     tables = []
     for part in parts:
         try:
-            tables.append(open_segment(run, part).table())
+            with SegmentFile(run, part) as file:
+                if not all(file.intact):
+                    return None
+                tables.append(Table.join([file.rows(group) for group in range(len(file.intact))]))
         except (FileNotFoundError, TypeError, ValueError):
             return None
         if tables[-1].schema != tables[0].schema:
@@ -59,24 +62,24 @@ def row_groups(tables: list[Table]) -> Iterator[Table]:
     waiting: list[Table] = []
     for table in tables:
         waiting.append(table)
-        if sum(one.num_rows for one in waiting) >= _GROUP_ROWS:
+        if sum(rows.num_rows for rows in waiting) >= GROUP_ROWS:
             yield Table.join(waiting)
             waiting = []
     if waiting:
         yield Table.join(waiting)
 
 
-def unlisted(run: Path, found: Manifest) -> list[str]:
+def unlisted(run: Path, manifest: Manifest) -> list[str]:
     """Files that a kill left before their line was written, or after the line on their removal; none if lines of the
     manifest are damaged, which may have listed them.
     """
-    if found.broken:
+    if manifest.broken:
         return []
-    listed = {segment.name for segment in found.segments}
+    listed = {segment.name for segment in manifest.segments}
     folders = [table for table in TABLES if is_folder(run / table)]
     names = [f"{table}/{path.name}" for table in folders for path in (run / table).iterdir()]
     names = [name for name in names if name not in listed and SEGMENT_NAME.fullmatch(name)]
-    return [name for name in names if found.is_closed(segment_numbers(name)[1])]
+    return [name for name in names if manifest.is_closed(segment_numbers(name)[1])]
 
 
 def _level(segment: Segment) -> int:

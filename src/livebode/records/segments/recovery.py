@@ -55,10 +55,10 @@ def recover(run: Path) -> UnfinishedRun | None:
             path=str(run),
             argument="force",
         )
-    found = Manifest.read(run)
-    found.check(run, journal.numbers(run))
-    sweep(run, found)
-    left = [number for number in journal.numbers(run) if not found.is_closed(number)]
+    listed = Manifest.read(run)
+    listed.check(run, journal.numbers(run))
+    sweep(run, listed)
+    left = [number for number in journal.numbers(run) if not listed.is_closed(number)]
     damaged: list[int] = []
     while left:
         number = left.pop()
@@ -74,8 +74,8 @@ def recover(run: Path) -> UnfinishedRun | None:
         torn += max(0, (run / EVENTS).stat().st_size - read.commit.events_bytes)
         if damaged or read.damages:
             sealed = [*left, number, *damaged]
-            return UnfinishedRun(found, sealed[-1] + 1, None, read.commit, sealed, torn)
-        return UnfinishedRun(found, number, read.length, read.commit, left, torn)
+            return UnfinishedRun(listed, sealed[-1] + 1, None, read.commit, sealed, torn)
+        return UnfinishedRun(listed, number, read.length, read.commit, left, torn)
     raise RecordError(
         "not-continuable",
         f"the run in {str(run)!r} has no intact journal to continue from",

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import errno
-import hashlib
 import io
 import logging
 import os
@@ -12,14 +11,14 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from livebode.core import remove_files, sync_directory, write_whole
+from livebode.records.column_table import ColumnTable
 from livebode.records.inside import is_folder
-from livebode.records.json_format import VERSIONS
 from livebode.records.segments import journal, manifest
 from livebode.records.segments.disk import AppendFile
 from livebode.records.segments.manifest import Manifest, Retained, Segment
 from livebode.records.segments.merging import groups_to_merge, row_groups, rows_to_merge, unlisted
-from livebode.records.table_file import ColumnTable
-from livebode.tables import ParquetWriter, Table
+from livebode.records.segments.segment_writer import SegmentWriter
+from livebode.tables import Table
 
 FIRST_TO_GO = "samples"
 _LONG_BYTES, _SHORTER = 128 << 10, 3
@@ -53,15 +52,14 @@ class Shelf:
     """
 
     def __init__(
-        self, run: Path, tables: Mapping[str, ColumnTable], found: Manifest, sealed: list[int], tiers: Tiers = no_tiers
+        self, run: Path, tables: Mapping[str, ColumnTable], listed: Manifest, sealed: list[int], tiers: Tiers = no_tiers
     ) -> None:
         self._run, self._tables, self._tiers = run, tables, tiers
-        self._file = AppendFile(run, manifest.NAME, found.length)
-        self._segments = list(found.segments)
-        self._retained = list(found.retained)
-        self._version = found.version
-        self._closed, self._sound = found.last_closed, not found.broken
-        places = [(found.place(name), name) for name in found.merged]
+        self._file = AppendFile(run, manifest.NAME, listed.length)
+        self._segments = list(listed.segments)
+        self._retained = list(listed.retained)
+        self._closed, self._sound = listed.last_closed, not listed.broken
+        places = [(listed.place(name), name) for name in listed.merged]
         self._places = [(place[0].name, name, place[1]) for place, name in places if place is not None]
         self._sealed = list(sealed)
         self._unwanted: list[str] = []
@@ -78,7 +76,7 @@ class Shelf:
     @property
     def used_bytes(self) -> int:
         """The recorded segments and retained damaged journals of the manifest."""
-        sizes = [one.size_bytes for one in self._segments] + [one.size_bytes for one in self._retained]
+        sizes = [each.size_bytes for each in self._segments] + [each.size_bytes for each in self._retained]
         return self._file.length + sum(sizes)
 
     @property
@@ -109,7 +107,9 @@ class Shelf:
         """
         gone: list[Segment] = []
         excess = self.used_bytes - bytes_max
-        order = sorted(self._segments, key=lambda one: (one.table != FIRST_TO_GO) + (one.table in manifest.TIERS))
+        order = sorted(
+            self._segments, key=lambda segment: (segment.table != FIRST_TO_GO) + (segment.table in manifest.TIERS)
+        )
         for segment in order:
             if excess <= 0:
                 break
@@ -160,18 +160,13 @@ class Shelf:
         write_whole(self._run / manifest.NAME, data, locked=True)
         before, self._file = self._file, AppendFile(self._run, manifest.NAME)
         before.close()
-        self._version = VERSIONS["manifest"]
 
     def _replace(self, parts: list[Segment], rows: list[Table]) -> None:
         name = manifest.name_of(parts[0].table, parts[0].numbers[0], parts[-1].numbers[1])
         segment = self._put(name, parts[0].table, *row_groups(rows))
-        lines = manifest.merge_line(parts, segment)
-        if self._version < VERSIONS["manifest"]:
-            lines = manifest.first_line() + lines
-        self._file.append_synced(lines)
-        self._version = VERSIONS["manifest"]
+        self._file.append_synced(manifest.merge_line(parts, segment))
         self._segments[self._segments.index(parts[0])] = segment
-        self._segments = [one for one in self._segments if one not in parts]
+        self._segments = [listed for listed in self._segments if listed not in parts]
         before = 0
         for part in parts:
             self._places = [
@@ -218,41 +213,30 @@ class Shelf:
             sync_directory(self._run)
         sink = io.BytesIO()
         repeating = self._tables["responses" if table in manifest.TIERS else table].repeating
-        writer = ParquetWriter(sink, groups[0].schema, repeating)
+        writer = SegmentWriter(sink, groups[0].schema, repeating)
         for group in groups:
             writer.write(group)
-        writer.close()
+        segment = writer.close(name, table)
         data = sink.getvalue()  # a view of it would be reported as an error where a failed write remains in a cycle
         write_whole(self._run / name, data, locked=True)
-        first, last = groups[0], groups[-1]
-        return Segment(
-            name=name,
-            table=table,
-            rows=sum(group.num_rows for group in groups),
-            first_sample=int(first["sample"][0]),
-            last_sample=int(last["sample"][-1]),
-            first_s=float(first["time_s"][0]),
-            last_s=float(last["time_s"][-1]),
-            size_bytes=len(data),
-            sha256=hashlib.sha256(data).hexdigest(),
-        )
+        return segment
 
 
-def sweep(run: Path, found: Manifest) -> None:
+def sweep(run: Path, listed: Manifest) -> None:
     """Remove what a kill left between two steps: segments with a line on their removal or merging, merged ones without
     a line, and closed journals.
 
     Other remainders of a kill are written again with the same name.
     """
-    for segment in found.gone:
+    for segment in listed.gone:
         _removed(run, segment.name)
-    for name in unlisted(run, found):
+    for name in unlisted(run, listed):
         _removed(run, name)
-    retained = {one.number for one in found.retained}
+    retained = {each.number for each in listed.retained}
     for number in journal.numbers(run):
         if number in retained:
             journal.set_aside(run, number)
-        elif found.is_closed(number):
+        elif listed.is_closed(number):
             _removed(run, journal.name_of(number))
 
 

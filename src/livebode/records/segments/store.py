@@ -13,6 +13,7 @@ from typing import Any
 
 from livebode.core import Emit, Event, LivebodeError, RecordError, ignore, sync_directory, why, write_whole, writing
 from livebode.language import Message
+from livebode.records.column_table import ColumnTable
 from livebode.records.inside import check_own
 from livebode.records.segments import journal, manifest
 from livebode.records.segments.closing import Closing
@@ -30,7 +31,6 @@ from livebode.records.segments.shelf import Shelf, Tiers, no_tiers
 from livebode.records.segments.syncing import Syncing
 from livebode.records.segments.waiting import UnsyncedRows
 from livebode.records.summary_file import COPY, RUN, to_document
-from livebode.records.table_file import ColumnTable
 from livebode.tables import Table
 
 _NEARLY = 15 / 16  # of the bytes of a journal: the next commit may fill it
@@ -101,9 +101,9 @@ class Store:
             files.callback(phase.release)
             self.phase = phase.part
             self._files = files
-            found = recover(self.path)
-            if found is not None:
-                self._go_on(found)
+            unfinished = recover(self.path)
+            if unfinished is not None:
+                self._go_on(unfinished)
             self._files = files.pop_all()
         return self
 
@@ -224,21 +224,21 @@ class Store:
         """Whether the previous journal is converted, or this one may not grow: no commit waits for a slow disk."""
         return self._journal.length >= self.limits.journal_bytes_max or self._closing.ends()
 
-    def _go_on(self, found: UnfinishedRun) -> None:
-        self.last = found.commit
-        self._waiting.rows |= found.commit.rows
-        self._open_files(found.manifest, found.sealed, found.commit.events_bytes)
-        if found.length is None:
-            self._open_journal(found.number, found.commit)
+    def _go_on(self, unfinished: UnfinishedRun) -> None:
+        self.last = unfinished.commit
+        self._waiting.rows |= unfinished.commit.rows
+        self._open_files(unfinished.manifest, unfinished.sealed, unfinished.commit.events_bytes)
+        if unfinished.length is None:
+            self._open_journal(unfinished.number, unfinished.commit)
         else:
-            self._journal = AppendFile(self.path, journal.name_of(found.number), found.length)
-            self._number, self._safe_bytes = found.number, found.length
-            self._began = found.commit.sample
+            self._journal = AppendFile(self.path, journal.name_of(unfinished.number), unfinished.length)
+            self._number, self._safe_bytes = unfinished.number, unfinished.length
+            self._began = unfinished.commit.sample
         self._shorten_segment()
         self._files.callback(self._close_open_journal)
-        if found.sealed:
+        if unfinished.sealed:
             self._begin_closing()
-        away_s = time.time() - found.commit.unix_s
+        away_s = time.time() - unfinished.commit.unix_s
         pause = f"{away_s:.1f} s after it ended there"
         if away_s < 0:
             pause = (
@@ -247,19 +247,19 @@ class Store:
             )
         self._log.report(
             "record-continued",
-            found.commit.sample,
-            found.commit.time_s,
-            f"the record continues at sample {found.commit.sample}, {pause}",
+            unfinished.commit.sample,
+            unfinished.commit.time_s,
+            f"the record continues at sample {unfinished.commit.sample}, {pause}",
             away_s=away_s if away_s >= 0 else None,
-            torn_bytes=found.torn_bytes,
+            torn_bytes=unfinished.torn_bytes,
         )
 
-    def _open_files(self, found: Manifest, sealed: list[int], events_bytes: int) -> None:
-        self._shelf = Shelf(self.path, self._tables, found, sealed, self._tiers)
+    def _open_files(self, listed: Manifest, sealed: list[int], events_bytes: int) -> None:
+        self._shelf = Shelf(self.path, self._tables, listed, sealed, self._tiers)
         self._files.callback(self._shelf.close)
         self._closing = Closing(self._shelf)
         self._files.callback(self._closing.wait)
-        self._named = len(found.retained)
+        self._named = len(listed.retained)
         self._events = AppendFile(self.path, EVENTS, events_bytes)
         self._files.callback(self._events.close)
         if self._events.length < events_bytes:
@@ -272,8 +272,11 @@ class Store:
     def _write_summary(self, summary: dict[str, Any], *, finished: bool) -> None:
         record: dict[str, Any] = {"finished": finished, "tables": list(self._tables)}
         if retained := self._shelf.retained:
-            places = [place for one in retained for place in one.damages]
-            record["damaged"] = {"files": [journal.set_aside_name(one.number) for one in retained], **total(places)}
+            places = [place for damaged_journal in retained for place in damaged_journal.damages]
+            record["damaged"] = {
+                "files": [journal.set_aside_name(damaged_journal.number) for damaged_journal in retained],
+                **total(places),
+            }
         if finished:
             summary |= {"size_bytes": {EVENTS: self._events.length, manifest.NAME: self._shelf.manifest_bytes}}
         data = to_document(summary | {"record": record})
@@ -406,7 +409,7 @@ class Store:
     def _go_on_after_pause(self, sample: int, time_s: float) -> None:
         if self._pause is None:
             return
-        lost = self._waiting.take_lost()
+        lost = self._waiting.drain_lost()
         message = Message("recording resumes at sample {at_sample}; nothing is lost", at_sample=sample)
         if lost:
             rows = (
@@ -425,6 +428,6 @@ class Store:
             message,
             paused_at=self._pause.sample,
             lost=lost,
-            lost_events=self._log.take_given_up(),
+            lost_events=self._log.drain_given_up(),
         )
         self._pause = None

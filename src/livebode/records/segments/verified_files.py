@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import io
+import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,6 +12,7 @@ from typing import Any, NoReturn
 from livebode.core import Event, needing
 from livebode.records.segments import reading
 from livebode.records.segments.manifest import Segment
+from livebode.tables import ParquetFile
 
 with needing("PyArrow", "query", "a query"):
     import pyarrow as pa
@@ -40,15 +43,17 @@ def segment_groups(run: Path, segments: list[Segment], damages: list[Event]) -> 
     OSError
         If a file cannot be read.
     """
-    first = next((found for one in segments if (found := reading.whole(run, one, damages.append)) is not None), None)
-    if first is None:
+    schema = _schema(run, segments, damages)
+    if schema is None:
         return []
-    schema = pa.schema(first.schema)
     named = {segment.name: segment for segment in segments}
 
     def opened(name: str) -> pa.NativeFile | None:
-        file = reading.whole(run, named[name], damages.append)
-        return None if file is None else pa.BufferReader(file.content)
+        file = reading.intact_file(run, named[name], damages.append)
+        if file is None:
+            return None
+        with file:
+            return pa.PythonFile(_OwnedFile(os.dup(file.fileno())), "r")
 
     files = PyFileSystem(VerifiedFiles(schema, opened))
     parquet = ds.ParquetFileFormat()
@@ -56,16 +61,35 @@ def segment_groups(run: Path, segments: list[Segment], damages: list[Event]) -> 
     groups = []
     for begin in range(0, len(segments), size):
         part = segments[begin : begin + size]
-        pieces = [parquet.make_fragment(one.name, files, partition_expression=_within(one)) for one in part]
+        pieces = [parquet.make_fragment(segment.name, files, partition_expression=_within(segment)) for segment in part]
         rows = ds.FileSystemDataset(pieces, schema, parquet, files)
-        groups.append(SegmentGroup(rows, min(one.first_s for one in part), max(one.last_s for one in part)))
+        groups.append(
+            SegmentGroup(rows, min(segment.first_s for segment in part), max(segment.last_s for segment in part))
+        )
     return groups
+
+
+def _schema(run: Path, segments: list[Segment], damages: list[Event]) -> pa.Schema | None:
+    """The columns of the first segment that is not damaged; None if all are."""
+    for segment in segments:
+        file = reading.intact_file(run, segment, damages.append)
+        if file is not None:
+            with file:
+                return pa.schema(ParquetFile(file).schema)
+    return None
 
 
 def _within(segment: Segment) -> ds.Expression:
     sample, time_s = ds.field("sample"), ds.field("time_s")
     of_samples = (sample >= segment.first_sample) & (sample <= segment.last_sample)
     return of_samples & (time_s >= segment.first_s) & (time_s <= segment.last_s)
+
+
+class _OwnedFile(io.FileIO):
+    """A file that is closed with the last reference to it, without a warning, because Arrow closes none."""
+
+    def __del__(self) -> None:
+        self.close()
 
 
 class VerifiedFiles(FileSystemHandler):  # type: ignore[misc]

@@ -85,6 +85,6 @@ class UnsyncedRows:
             sum_["last_sample"] = part.last_sample
         self._parts.clear()
 
-    def take_lost(self) -> dict[str, dict[str, int]]:
+    def drain_lost(self) -> dict[str, dict[str, int]]:
         lost, self.lost = self.lost, {}
         return lost

@@ -35,7 +35,7 @@ class InfluxSink:
 
     def send_values(self, values: Sequence[AxisValues]) -> None:
         """Write the points of all axes in one request."""
-        self._write([text for one in values for text in value_lines(one)])
+        self._write([text for value in values for text in value_lines(value)])
 
     def close(self) -> None:
         """Close the connection."""
@@ -74,8 +74,11 @@ def value_lines(values: AxisValues) -> Iterator[str]:
     fields: dict[str, Value | None] = {
         name: float(value) if isinstance(value, int | float) else value for name, value in values.status.items()
     }
-    for one in values.measurements:
-        fields |= {one.name: one.value, f"{one.name}_bound": None if one.value is None else one.bound}
+    for measurement in values.measurements:
+        fields |= {
+            measurement.name: measurement.value,
+            f"{measurement.name}_bound": None if measurement.value is None else measurement.bound,
+        }
     if any(value is not None for value in fields.values()):
         yield line("livebode", tags, fields, values.unix_s)
     if values.response is None:

@@ -40,10 +40,10 @@ class MqttSink:
 
     def send_values(self, values: Sequence[AxisValues]) -> None:
         """Publish the newest results, and what Home Assistant needs where it is new."""
-        for one in values:
-            messages = [*messages_of(one, self._base)]
+        for value in values:
+            messages = [*messages_of(value, self._base)]
             if self._section.discovery:
-                described = [*discovery_of(one, self._base)]
+                described = [*discovery_of(value, self._base)]
                 new = [message for message in described if message[0] not in self._described]
                 self._link.publish(new)
                 self._described |= {topic for topic, _, _ in new}
@@ -66,7 +66,7 @@ def messages_of(values: AxisValues, base: str) -> Iterator[Message]:
     above = f"{base}/{level(values.axis)}"
     plain = values.plain()
     response = plain.pop("response")
-    plain["parameters"] = {one.pop("name"): one for one in plain.pop("measurements")}
+    plain["parameters"] = {parameter.pop("name"): parameter for parameter in plain.pop("measurements")}
     about = {name: plain.pop(name) for name in ("quantity", "unit")}
     yield f"{above}/values", _json(plain), True
     if response is not None:
@@ -87,11 +87,14 @@ def discovery_of(values: AxisValues, base: str) -> Iterator[Message]:
         "device": device,
         "origin": {"name": "livebode", "sw_version": __version__},
     }
-    for one in values.measurements:
-        sensor = {"name": one.name, "value_template": f"{{{{ value_json.parameters['{one.name}'].value }}}}"}
-        unit = {"unit_of_measurement": one.unit} if one.unit else {}
+    for measurement in values.measurements:
+        sensor = {
+            "name": measurement.name,
+            "value_template": f"{{{{ value_json.parameters['{measurement.name}'].value }}}}",
+        }
+        unit = {"unit_of_measurement": measurement.unit} if measurement.unit else {}
         state = {"state_class": "measurement", "suggested_display_precision": 4}
-        yield _entity("sensor", values, one.name, common | sensor | unit | state)
+        yield _entity("sensor", values, measurement.name, common | sensor | unit | state)
     for name, unit_text in (("samples", ""), ("responses", ""), ("lost", ""), ("latency_s", "s"), ("state", "")):
         if name in values.status:
             sensor = {"name": name, "value_template": f"{{{{ value_json.status.{name} }}}}"}

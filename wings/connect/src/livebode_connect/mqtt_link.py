@@ -58,9 +58,9 @@ class MqttLink:
         client = self.connected()
         sent = [client.publish(topic, payload, qos=qos, retain=kept) for topic, payload, kept in messages]
         try:
-            for one in sent:
-                one.wait_for_publish(self._section.timeout_s)
-                if not one.is_published():
+            for message in sent:
+                message.wait_for_publish(self._section.timeout_s)
+                if not message.is_published():
                     raise TimeoutError
         except (RuntimeError, ValueError, TimeoutError) as error:
             gone = isinstance(error, TimeoutError) and client.is_connected()

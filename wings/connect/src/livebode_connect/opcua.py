@@ -211,17 +211,19 @@ class OpcUaSink:
         return self._ua.QualifiedName(name, self._index)
 
     async def _set_all(self, values: Sequence[AxisValues]) -> None:
-        for one in values:
-            for measured in one.measurements:
-                await self._set_measurement(one, measured)
-            for name, value in one.status.items():
-                await self._set(one, ("Status", name), value)
-            alarms = [f"{alarm.priority}: {alarm.message}" for alarm in one.alarms]
-            await self._set(one, ("Status", "alarms"), alarms)
-            for name in ("frequency_hz", "real", "imag", "sigma", "coherence") if one.response else ():
-                column = (one.response or {})[name]
-                await self._set(one, ("Response", name), [float("nan") if v is None else float(v) for v in column])
-            await self._set_result(one)
+        for axis_values in values:
+            for measured in axis_values.measurements:
+                await self._set_measurement(axis_values, measured)
+            for name, value in axis_values.status.items():
+                await self._set(axis_values, ("Status", name), value)
+            alarms = [f"{alarm.priority}: {alarm.message}" for alarm in axis_values.alarms]
+            await self._set(axis_values, ("Status", "alarms"), alarms)
+            for name in ("frequency_hz", "real", "imag", "sigma", "coherence") if axis_values.response else ():
+                column = (axis_values.response or {})[name]
+                await self._set(
+                    axis_values, ("Response", name), [float("nan") if v is None else float(v) for v in column]
+                )
+            await self._set_result(axis_values)
 
     async def _set_result(self, values: AxisValues) -> None:
         if values.axis not in self._results:

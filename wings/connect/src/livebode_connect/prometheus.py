@@ -100,7 +100,7 @@ def metrics(values: Sequence[AxisValues]) -> Iterator[Metric]:
     alarm = GaugeMetricFamily(
         "livebode_alarm", "1 for each active alarm", labels=["axis", "machine", "cause", "kind", "priority"]
     )
-    at = GaugeMetricFamily(
+    response_time = GaugeMetricFamily(
         "livebode_result_timestamp_seconds", "Effective time of the newest response", labels=["axis"]
     )
     numbers = {
@@ -109,22 +109,22 @@ def metrics(values: Sequence[AxisValues]) -> Iterator[Metric]:
         )
         for name, (kind, metric, about) in _STATUS.items()
     }
-    for one in values:
-        own = [one.axis, one.machine]
-        at.add_metric([one.axis], one.unix_s)
-        for measured in one.measurements:
+    for axis_values in values:
+        own = [axis_values.axis, axis_values.machine]
+        response_time.add_metric([axis_values.axis], axis_values.unix_s)
+        for measured in axis_values.measurements:
             if measured.value is not None:
                 parameter.add_metric([*own, measured.name, measured.unit], measured.value)
             if measured.value is not None and measured.bound is not None:
                 bound.add_metric([*own, measured.name, measured.unit], measured.bound)
-        for active in one.alarms:
+        for active in axis_values.alarms:
             alarm.add_metric([*own, active.cause, active.kind, active.priority], 1)
-        for name, value in one.status.items():
+        for name, value in axis_values.status.items():
             if name == "state":
                 state.add_metric([*own, str(value)], 1)
             elif name in numbers:
                 numbers[name].add_metric(own, float(value))
-    yield from (parameter, bound, state, alarm, at, *numbers.values(), *_responses(values))
+    yield from (parameter, bound, state, alarm, response_time, *numbers.values(), *_responses(values))
 
 
 def _responses(values: Sequence[AxisValues]) -> Iterator[Metric]:
@@ -134,9 +134,9 @@ def _responses(values: Sequence[AxisValues]) -> Iterator[Metric]:
     labels = ["axis", "machine", "quantity", "unit", "frequency_hz"]
     magnitude = GaugeMetricFamily("livebode_response_magnitude", "Magnitude at a line", labels=labels)
     phase = GaugeMetricFamily("livebode_response_phase_radians", "Phase at a line", labels=labels)
-    for one in values:
-        for frequency_hz, value in _valid(one.response or {}):
-            of = [one.axis, one.machine, one.quantity, one.unit, f"{frequency_hz:.9g}"]
+    for axis_values in values:
+        for frequency_hz, value in _valid(axis_values.response or {}):
+            of = [axis_values.axis, axis_values.machine, axis_values.quantity, axis_values.unit, f"{frequency_hz:.9g}"]
             magnitude.add_metric(of, abs(value))
             phase.add_metric(of, float(np.angle(value)))
     yield from (magnitude, phase)

@@ -48,17 +48,17 @@ def commands(data: bytes) -> dict[str, bool]:
     >>> commands(b"no payload")
     {}
     """
-    found = {}
+    states = {}
     try:
         for number, metric in _fields(data):
             if number == 2 and isinstance(metric, bytes):
                 fields = dict(_fields(metric))
                 name, value = fields.get(1), fields.get(14)
                 if isinstance(name, bytes) and isinstance(value, int):
-                    found[name.decode()] = bool(value)
+                    states[name.decode()] = bool(value)
     except (ValueError, IndexError):
         return {}
-    return found
+    return states
 
 
 def _metric(metric: Metric, unix_ms: int, units: bool) -> bytes:
@@ -92,42 +92,42 @@ def _text(field: int, value: bytes) -> bytes:
 
 
 def _varint(value: int) -> bytes:
-    found = bytearray()
+    encoded = bytearray()
     while value > 0x7F:
-        found.append(value & 0x7F | 0x80)
+        encoded.append(value & 0x7F | 0x80)
         value >>= 7
-    return bytes([*found, value])
+    return bytes([*encoded, value])
 
 
 def _fields(data: bytes) -> Iterator[tuple[int, int | bytes]]:
     """Number and value of each field; IndexError or ValueError for what is none."""
-    at = 0
-    while at < len(data):
-        key, at = _read_varint(data, at)
+    position = 0
+    while position < len(data):
+        key, position = _read_varint(data, position)
         kind = key & 7
         if kind == _VARINT:
-            value, at = _read_varint(data, at)
+            value, position = _read_varint(data, position)
             yield key >> 3, value
             continue
         if kind not in (_FIXED64, _BYTES, _FIXED32):
             raise ValueError("this wire type is not used")
         length = {_FIXED64: 8, _FIXED32: 4}.get(kind, 0)
         if kind == _BYTES:
-            length, at = _read_varint(data, at)
-        if at + length > len(data):
+            length, position = _read_varint(data, position)
+        if position + length > len(data):
             raise ValueError("the field is cut")
-        yield key >> 3, data[at : at + length]
-        at += length
+        yield key >> 3, data[position : position + length]
+        position += length
 
 
-def _read_varint(data: bytes, at: int) -> tuple[int, int]:
+def _read_varint(data: bytes, position: int) -> tuple[int, int]:
     value = 0
     for shift in range(0, 70, 7):
-        byte = data[at]
+        byte = data[position]
         value |= (byte & 0x7F) << shift
-        at += 1
+        position += 1
         if byte < 0x80:
-            return value, at
+            return value, position
     raise ValueError("a number of more than 64 bits")
 
 
@@ -168,7 +168,7 @@ class SparkplugSink:
         """Publish what has changed of each axis, or its birth."""
         self._link.connected()
         with self._lock:
-            self._link.publish([message for one in values if (message := self._device(one)) is not None], qos=0)
+            self._link.publish([message for value in values if (message := self._device(value)) is not None], qos=0)
 
     def close(self) -> None:
         """Publish the death, and disconnect."""
@@ -218,16 +218,16 @@ class SparkplugSink:
 
 def metrics_of(values: AxisValues) -> list[Metric]:
     """The results of an axis as metrics."""
-    found = [Metric("Alarms/active", UINT64, len(values.alarms))]
+    metrics = [Metric("Alarms/active", UINT64, len(values.alarms))]
     newest = max(values.alarms, key=lambda alarm: alarm.unix_s, default=None)
-    found.append(Metric("Alarms/newest", STRING, "" if newest is None else newest.message))
-    for one in values.measurements:
-        found.append(Metric(f"Parameters/{one.name}", DOUBLE, one.value, one.unit))
-        found.append(Metric(f"Parameters/{one.name} bound", DOUBLE, one.bound, one.unit))
+    metrics.append(Metric("Alarms/newest", STRING, "" if newest is None else newest.message))
+    for measurement in values.measurements:
+        metrics.append(Metric(f"Parameters/{measurement.name}", DOUBLE, measurement.value, measurement.unit))
+        metrics.append(Metric(f"Parameters/{measurement.name} bound", DOUBLE, measurement.bound, measurement.unit))
     for name, value in values.status.items():
         datatype = STRING if isinstance(value, str) else UINT64 if name in _COUNTS else DOUBLE
-        found.append(Metric(f"Status/{name}", datatype, value))
-    return found
+        metrics.append(Metric(f"Status/{name}", datatype, value))
+    return metrics
 
 
 def _now_ms() -> int:

@@ -60,10 +60,10 @@ class SyslogSink:
     def _connected(self) -> socket.socket:
         where, timeout_s = (self._host, self._port), self._section.timeout_s
         if self._scheme == "udp":
-            family, kind, protocol, _, found = socket.getaddrinfo(*where, type=socket.SOCK_DGRAM)[0]
+            family, kind, protocol, _, address = socket.getaddrinfo(*where, type=socket.SOCK_DGRAM)[0]
             link = socket.socket(family, kind, protocol)
             link.settimeout(timeout_s)
-            link.connect(found)
+            link.connect(address)
             return link
         link = socket.create_connection(where, timeout_s)
         return link if self._context is None else self._context.wrap_socket(link, server_hostname=self._host)

@@ -34,7 +34,7 @@ class WebhookSink:
 
     def send_values(self, values: Sequence[AxisValues]) -> None:
         """Send the results of all axes in one request."""
-        self._post({"type": "values", "axes": [one.plain() for one in values]}, {})
+        self._post({"type": "values", "axes": [value.plain() for value in values]}, {})
 
     def close(self) -> None:
         """Close the connection."""

@@ -16,7 +16,6 @@ ANALYSES: Mapping[str, Analysis] = {
     "proposal": Analysis(
         "livebode_control.run_analyses:proposal",
         section="livebode_control.proposal.section:proposed_controller",
-        trial="livebode_control.trial.loop_trials:LoopTrials",
     ),
     "validation": Analysis(
         "livebode_control.run_analyses:validation",
@@ -25,3 +24,5 @@ ANALYSES: Mapping[str, Analysis] = {
     "friction": Analysis("livebode_control.run_analyses:friction"),
     "orders": Analysis("livebode_control.run_analyses:orders"),
 }
+PAGES: Mapping[str, str] = {"whatIf": "livebode_control.trial.loop_trials:LoopTrials"}
+"""What it adds to the page of a run."""

@@ -12,23 +12,13 @@ COMMANDS: Mapping[str, Command] = {
         "livebode_control.margins.margins_command:margins_command",
         panel=CONTROL,
     ),
-    "check-loop": Command(
-        "Compare the described controllers with the recorded signals: as described, or the change that explains them.",
-        "livebode_control.loop_check.check_loop_command:check_loop_command",
-        panel=CONTROL,
-    ),
     "tune": Command(
-        "Propose gains and filters for the described cascade, safe for every plant within the bounds of the run.",
+        "Propose gains and filters for the described cascade, safe for every plant within bounds; or input shapers.",
         "livebode_control.proposal.tune_command:tune_command",
         panel=CONTROL,
     ),
-    "shaper": Command(
-        "Propose input shapers for a mode of the fitted model, over its bounds at every place of the run.",
-        "livebode_control.proposal.shaper_command:shaper_command",
-        panel=CONTROL,
-    ),
     "validate": Command(
-        "Simulate the fitted model with another recording and test whether the residual correlates with the signals.",
+        "Test the fitted model on another recording, or with --loop the described controllers on the recorded signals.",
         "livebode_control.validation.validate_command:validate_command",
         panel=COMPARE,
     ),

@@ -88,9 +88,9 @@ def _peak(
     return Peak(quantity, place.name, (float(period.min()), float(period.max())), place.motion.get(quantity))
 
 
-def worst(found: tuple[Peak, ...]) -> dict[Quantity, Peak]:
+def worst(peaks: tuple[Peak, ...]) -> dict[Quantity, Peak]:
     """Both extremes of each quantity over all places; its place is that of the larger one, the travel has none."""
-    return {name: _ends([p for p in found if p.quantity == name]) for name in QUANTITIES}
+    return {name: _ends([p for p in peaks if p.quantity == name]) for name in QUANTITIES}
 
 
 def _ends(of: list[Peak]) -> Peak:

@@ -10,7 +10,7 @@ COMMANDS: Mapping[str, Command] = {
     "design": Command(
         "Choose lines, window, amplitude and hop for a machine, with reasons; write the excitation and axis.toml.",
         "livebode_design.design_command:design_command",
-        python="livebode_design.designing:design_described",
+        python="livebode_design.experiment_design:design_described",
         panel=MEASURE,
     ),
     "measure": Command(

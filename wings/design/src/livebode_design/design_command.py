@@ -42,8 +42,8 @@ def design_command(
     """Choose lines, window, amplitude and hop for a machine, with reasons; write the excitation and axis.toml."""
     from livebode.plugins import loaded
     from livebode.records import to_json
-    from livebode_design.designing import described, design_experiment
     from livebode_design.experiment import Experiment
+    from livebode_design.experiment_design import described, design_experiment
 
     given: dict[str, Any] = {
         "resolution_hz": resolution, "amplitude_n_m": amplitude, "accuracy": accuracy, "seed": seed,

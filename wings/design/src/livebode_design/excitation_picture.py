@@ -80,8 +80,8 @@ def _period(axes: Axes, look: Style, waveform: Waveform) -> None:
     if held.size > _POINTS_MAX:
         each = -(-samples.size // (_POINTS_MAX // 2))
         parts = np.array_split(samples, -(-samples.size // each))
-        at = ms[np.cumsum([0, *(part.size for part in parts[:-1])])]
-        axes.fill_between(at, [p.min() for p in parts], [p.max() for p in parts], color=look.run, label="excitation")
+        times = ms[np.cumsum([0, *(part.size for part in parts[:-1])])]
+        axes.fill_between(times, [p.min() for p in parts], [p.max() for p in parts], color=look.run, label="excitation")
     else:
         axes.plot(ms, held, drawstyle="steps-post", color=look.run, linewidth=1.2, label="excitation")
     axes.set_xlim(0, ms[-1])

@@ -14,9 +14,9 @@ from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 from livebode.configuration import LoopSection, nearest, read_table, shortened
 from livebode.core import ConfigError, nearest_name
 from livebode.estimation import DETECTION_LINES_MIN
+from livebode.excitation import BLOCK_PERIOD_MAX
 from livebode.simulation import BeltAxis, Drive, Friction, Limits, Mechanics, Sensor, Standstill, Strokes
 from livebode.sources.live import MeasureSection, SourceSettings
-from livebode.structured_text import PERIOD_MAX
 from livebode_design._choose import choose
 from livebode_design.belt import belt_machine
 from livebode_design.design import Design
@@ -95,41 +95,41 @@ class Experiment(BaseModel):
         required, above = data.get("excitation", {}), dict(over or {})
         if isinstance(required, dict):
             data["excitation"] = {key: value for key, value in required.items() if key not in _replaced(above)} | above
-        found = cls.of(data, str(path))
-        if found.source is not None:
-            found = found.model_copy(update={"source": found.source.beside(path.parent)})
-        if found.measured is None:
-            return found
-        return found.model_copy(
-            update={"measured": found.measured.model_copy(update={"run": path.parent / found.measured.run})}
+        experiment = cls.of(data, str(path))
+        if experiment.source is not None:
+            experiment = experiment.model_copy(update={"source": experiment.source.beside(path.parent)})
+        if experiment.measured is None:
+            return experiment
+        return experiment.model_copy(
+            update={"measured": experiment.measured.model_copy(update={"run": path.parent / experiment.measured.run})}
         )
 
     @classmethod
     def of(cls, data: Mapping[str, Any], origin: str) -> Experiment:
         """The Experiment in plain data; `origin` names it in messages."""
         try:
-            found = cls.model_validate(data)
+            experiment = cls.model_validate(data)
         except ValidationError as error:
             raise first_of(error, {"": Experiment, "measured": MeasuredSection}).at(origin) from None
-        if found.belt is not None and found.loop is not None:
+        if experiment.belt is not None and experiment.loop is not None:
             raise ConfigError(
                 "key-conflict", "a [belt] axis has its loop in [belt.drive]", "remove [loop]", key="loop"
             ).at(origin)
-        if found.belt is None and found.measured is None:
+        if experiment.belt is None and experiment.measured is None:
             raise ConfigError(
                 "key-missing",
                 "there is neither [belt] nor [measured], so that it describes no machine",
                 "describe a [belt] axis by its constants, or name a run of it in [measured]",
                 key="belt",
             ).at(origin)
-        if found.belt is not None and found.measured is not None:
+        if experiment.belt is not None and experiment.measured is not None:
             raise ConfigError(
                 "key-conflict",
                 "the machine is described twice, by [belt] and by [measured]",
                 "remove one of them",
                 key="belt",
             ).at(origin)
-        return found
+        return experiment
 
     def spec(self) -> ExperimentSpec:
         """Specification from [excitation]."""
@@ -220,9 +220,9 @@ class Experiment(BaseModel):
     def left_out(self, design: Design) -> dict[str, str]:
         """The formats that are not possible for a design, with the reason."""
         window = design.waveform.lines.window
-        if window <= PERIOD_MAX:
+        if window <= BLOCK_PERIOD_MAX:
             return {}
-        return {".st": f"no .st: its {window} samples are more than the {PERIOD_MAX} of a PLC's table"}
+        return {".st": f"no .st: its {window} samples are more than the {BLOCK_PERIOD_MAX} of a PLC's table"}
 
     def loop_tables(self) -> dict[str, Any]:
         """[loop] of the axis.toml, as in docs/reference/configuration.md."""

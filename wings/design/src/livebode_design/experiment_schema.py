@@ -33,13 +33,13 @@ def experiment_schema() -> Schema:
         limits=limits,
         signals=(create_model("Signals", __config__=_CONFIG, __doc__=_SIGNALS_DOC, **roles) | None, None),
     )
-    found = schema_of(model, "experiment")
-    found["$defs"]["Belt"]["not"] = {"required": ["strokes", "standstill"]}
-    found["$defs"]["ExperimentSpec"]["allOf"] = [
+    schema = schema_of(model, "experiment")
+    schema["$defs"]["Belt"]["not"] = {"required": ["strokes", "standstill"]}
+    schema["$defs"]["ExperimentSpec"]["allOf"] = [
         {"if": {"required": [key]}, "then": {"required": ["kind"], "properties": {"kind": {"const": kind}}}}
         for key, kind in KIND_OF_KEY.items()
     ]
-    return found | {
+    return schema | {
         "oneOf": [{"required": ["belt"]}, {"required": ["measured"]}],
         "not": {"required": ["belt", "loop"]},
     }
@@ -67,7 +67,9 @@ def matrix_experiment_schema() -> Schema:
 def _table(kind: Any) -> type[BaseModel]:
     """The table of a dataclass as a model."""
     hints = get_type_hints(kind, include_extras=True)
-    keys: Any = {one.name: (hints[one.name], ... if one.default is MISSING else one.default) for one in fields(kind)}
+    keys: Any = {
+        field.name: (hints[field.name], ... if field.default is MISSING else field.default) for field in fields(kind)
+    }
     return create_model(kind.__name__, __config__=_CONFIG, __doc__=kind.__doc__, **keys)
 
 

@@ -12,8 +12,8 @@ from typing import Any, Literal
 import numpy as np
 
 from livebode.core import DesignError, UsageError, needing, whole_file
-from livebode.excitation import Waveform
-from livebode.structured_text import check_name, multisine
+from livebode.excitation import Waveform, function_block
+from livebode.structured_text import check_name
 from livebode.version import __version__
 
 LETTERS_MAX = {"C": 63, "MATLAB": 31}  # significant in C99; in a struct's name of a MATLAB v5 file
@@ -77,12 +77,12 @@ def write_csv(path: Path, waveform: Waveform, name: str) -> None:
 
 def _arrays(waveform: Waveform) -> dict[str, Any]:
     lines = waveform.lines
-    at = list(lines.bins)
+    bins = list(lines.bins)
     return {
         "samples": waveform.samples,
         "frequency_hz": lines.frequency_hz,
         "amplitude": waveform.amplitude,
-        "phase": np.angle(waveform.spectrum[at]) + np.pi / 2,  # of sines, as in eq. (6)
+        "phase": np.angle(waveform.spectrum[bins]) + np.pi / 2,  # of sines, as in eq. (6)
         "rate_hz": lines.rate_hz,
         "facts": json.dumps(facts(waveform)),
     }
@@ -96,8 +96,8 @@ def write_npz(path: Path, waveform: Waveform, name: str) -> None:
 
 def write_mat(path: Path, waveform: Waveform, name: str) -> None:
     """A MATLAB v5 file with one struct of that name; its arrays are columns, `Ts` is the sample time in seconds."""
-    found = _arrays(waveform)
-    columns = {key: value[:, np.newaxis] if np.ndim(value) else value for key, value in found.items()}
+    arrays = _arrays(waveform)
+    columns = {key: value[:, np.newaxis] if np.ndim(value) else value for key, value in arrays.items()}
     write_struct(path, columns | {"Ts": 1 / waveform.lines.rate_hz}, name)
 
 
@@ -162,7 +162,7 @@ def write_st(path: Path, waveform: Waveform, name: str) -> None:
     """``FB_name``, limited to the period's own peak by default (w_max); the values are exactly the doubles."""
     check_name(name, "excitation")
     note = "\n".join(as_lines(facts(waveform)))
-    text = multisine(
+    text = function_block(
         waveform.samples, rate_hz=waveform.lines.rate_hz, limit=waveform.peak, name=f"FB_{name}", note=note,
         ramp_periods=waveform.ramp_periods,
     )  # fmt: skip

@@ -46,10 +46,10 @@ def grid(spec: ExperimentSpec, rate_hz: float) -> LineChoice:
         If the band is not below the Nyquist frequency, the lines are closer than any window resolves or more than
         5,000, or given lines are off the grid of a given window; the message has the nearest choice.
     """
-    found = _found(spec, rate_hz)
-    if len(found.lines) > _LINES_MAX:
-        raise _too_many(spec, found.lines, rate_hz)
-    return found
+    choice = _found(spec, rate_hz)
+    if len(choice.lines) > _LINES_MAX:
+        raise _too_many(spec, choice.lines, rate_hz)
+    return choice
 
 
 def _too_many(spec: ExperimentSpec, lines: Lines, rate_hz: float) -> GridError:
@@ -145,13 +145,13 @@ def _no_line(low: float, high: float, apart: int, window: int, rate_hz: float) -
     )
 
 
-def _stepped(spec: ExperimentSpec, found: LineChoice) -> LineChoice:
+def _stepped(spec: ExperimentSpec, choice: LineChoice) -> LineChoice:
     if spec.kind != "stepped":
-        return found
-    steps, periods = len(found.lines), spec.periods or _PERIODS
-    whole = stepped_lines(found.lines, periods=periods)
-    why = f"{counted(steps, 'step')} of {counted(periods, 'period')} of {found.lines.window} samples"
-    return LineChoice(whole, why, found.lines_why, base=found.lines, periods=periods)
+        return choice
+    steps, periods = len(choice.lines), spec.periods or _PERIODS
+    whole = stepped_lines(choice.lines, periods=periods)
+    why = f"{counted(steps, 'step')} of {counted(periods, 'period')} of {choice.lines.window} samples"
+    return LineChoice(whole, why, choice.lines_why, base=choice.lines, periods=periods)
 
 
 def _window(resolution_hz: float, apart: int, rate_hz: float) -> tuple[int, str]:

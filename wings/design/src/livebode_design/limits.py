@@ -94,13 +94,13 @@ def check_known(machine: Machine, limits: MachineLimits) -> None:
             )
 
 
-def room(found: tuple[Peak, ...], limits: MachineLimits) -> tuple[float, Peak | None]:
+def room(peaks: tuple[Peak, ...], limits: MachineLimits) -> tuple[float, Peak | None]:
     """Factor on the excitation that reaches the first limit, and the peak that reaches it.
 
     0 or less where the motion alone leaves no room; infinite, with None, without limits.
     """
     largest, first = inf, None
-    for peak in found:
+    for peak in peaks:
         low, high = limits.of(peak.quantity)
         least, most = peak.own or (0.0, 0.0)
         for own, excited, limit in ((most, peak.excited[1], high), (-least, -peak.excited[0], -low)):
@@ -134,14 +134,14 @@ def beyond(peak: Peak, limits: MachineLimits, share: float, amplitude: float | N
             limit=limit,
         )
     if amplitude is None:
-        what, remedy = "the amplitudes as listed give", f"multiply them by {passing:.4g} or less"
+        cause, remedy = "the amplitudes as listed give", f"multiply them by {passing:.4g} or less"
     else:
-        what, remedy = f"an amplitude of {amplitude:.4g} N m gives", f"take at most {passing:.4g} N m"
+        cause, remedy = f"an amplitude of {amplitude:.4g} N m gives", f"take at most {passing:.4g} N m"
     if passing <= 0:
         remedy = "take finer steps of the drive: no smaller amplitude is possible in these"
     return DesignError(
         "limit-exceeded",
-        f"{what} a {name} of {value:.4g} {unit}{where}, beyond the limit of {limit:.4g} {unit}",
+        f"{cause} a {name} of {value:.4g} {unit}{where}, beyond the limit of {limit:.4g} {unit}",
         remedy,
         argument="amplitude_n_m",
         quantity=name,

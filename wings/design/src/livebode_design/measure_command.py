@@ -15,7 +15,7 @@ from livebode.cli import Json, can_draw, console
 
 if TYPE_CHECKING:
     from livebode_design.experiment import Experiment
-    from livebode_design.measuring import Prepared
+    from livebode_design.measurement import ReadyMeasurement
     from livebode_design.playback import StopRequest
 
 
@@ -39,7 +39,7 @@ def measure_command(
     from livebode_design.design_command import working
     from livebode_design.design_terminal import show_design
     from livebode_design.experiment import Experiment
-    from livebode_design.measuring import prepare
+    from livebode_design.measurement import prepare
 
     asked = Experiment.read(experiment)
     with working():
@@ -55,7 +55,7 @@ def measure_command(
     _measure(asked, prepared, out, as_json)
 
 
-def _show_playing(prepared: Prepared) -> None:
+def _show_playing(prepared: ReadyMeasurement) -> None:
     from livebode_design.design_terminal import plain_table
 
     table = plain_table("measurement", "value")
@@ -64,11 +64,11 @@ def _show_playing(prepared: Prepared) -> None:
     console(markup=False).print(table)
 
 
-def _measure(asked: Experiment, prepared: Prepared, out: Path, as_json: bool) -> None:
+def _measure(asked: Experiment, prepared: ReadyMeasurement, out: Path, as_json: bool) -> None:
     from livebode.cli import run_targets
     from livebode.locations import location
     from livebode.plugins import loaded
-    from livebode_design.measuring import measure
+    from livebode_design.measurement import measure
 
     def say(sentence: str) -> None:
         print(f"livebode: {sentence}", flush=True, file=sys.stderr if as_json else sys.stdout)

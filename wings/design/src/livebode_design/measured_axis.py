@@ -12,7 +12,7 @@ from livebode.configuration import LoopSection, recorded_configuration
 from livebode.core import ConfigError, read_unit, split_plant_unit
 from livebode.records import RunRecord
 from livebode_design.machine import MOTION_KEYS, Machine
-from livebode_design.measured import MeasuredResponse, Output, measured_machine
+from livebode_design.measured_plant import MeasuredResponse, Output, measured_machine
 
 Number = Annotated[float, Field(strict=True)]  # true is not a number
 

@@ -131,7 +131,7 @@ class Playback:
         for block in self._player.source.stream(wait_s=_LOOK_S):
             if block is not None and len(block):
                 heard = time.monotonic()
-                self._take(block, watch, table)
+                self._record(block, watch, table)
             elif time.monotonic() - heard > self._silence_s:
                 self._end(_silent(time.monotonic() - heard))
             if request.count and self._phase is not _Phase.ENDING:
@@ -144,7 +144,7 @@ class Playback:
                 return
         self._end(_silent(time.monotonic() - heard))
 
-    def _take(self, block: LiveBlock, watch: LimitWatch, table: LogTable) -> None:
+    def _record(self, block: LiveBlock, watch: LimitWatch, table: LogTable) -> None:
         table.append(block)
         self._played.append(block[self._excitation])
         zero = block[self._excitation] == 0.0
@@ -282,19 +282,19 @@ class LimitWatch:
                 first = int(beyond.argmax()), name
         if first is None:
             return None
-        at, name = first
-        value, (low, high) = float(block[name][at]), self._ranges[name]
+        index, name = first
+        value, (low, high) = float(block[name][index]), self._ranges[name]
         unit = next(channel.unit for channel in block.channels if channel.name == name)
         return MeasurementError(
             "limit-exceeded",
-            f"{name} = {value:.6g} {unit} at {(block.start + at) / block.rate_hz:.4f} s is outside of its limits "
+            f"{name} = {value:.6g} {unit} at {(block.start + index) / block.rate_hz:.4f} s is outside of its limits "
             f"{low:g} … {high:g} {unit}",
             "reduce the amplitude, or correct measure.limits",
             channel=name,
             value=value,
             low=low,
             high=high,
-            sample=block.start + at,
+            sample=block.start + index,
         )
 
 

@@ -135,8 +135,8 @@ def _check(spec: ExperimentSpec) -> None:
         )
 
 
-def _out_of_range(name: str, value: object, what: str, remedy: str, **facts: float) -> UsageError:
-    return UsageError("out-of-range", f"{name}={value} is not {what}", remedy, argument=name, value=value, **facts)
+def _out_of_range(name: str, value: object, expected: str, remedy: str, **facts: float) -> UsageError:
+    return UsageError("out-of-range", f"{name}={value} is not {expected}", remedy, argument=name, value=value, **facts)
 
 
 def _conflict(spec: ExperimentSpec, name: str, message: str, remedy: str) -> UsageError:

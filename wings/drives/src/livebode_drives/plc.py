@@ -167,6 +167,6 @@ def _flat(lines: Lines, amplitude: float | None) -> tuple[Floats, int, str]:
 
 
 def _designed(waveform: Waveform) -> tuple[Floats, int, str]:
-    """The same for a design."""
+    """The period of a designed excitation, the periods of its ramp, and its description."""
     note = "\n".join(f"{key}: {json.dumps(value)}" for key, value in waveform.about.items())
     return waveform.samples, waveform.ramp_periods, note

@@ -41,7 +41,7 @@ def plc_command(
     """Write function blocks for the PLC of an axis: excitation, sliding DFT and the ring buffer that livebode reads."""
     from livebode.configuration import Axis
     from livebode.records import to_json
-    from livebode_drives.designed import read_designed
+    from livebode_drives.excitation_file import read_designed
     from livebode_drives.plc import plc_project
     from livebode_drives.structured_text.twincat import twincat as as_twincat
 

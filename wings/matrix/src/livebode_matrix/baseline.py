@@ -7,7 +7,7 @@ from pathlib import Path
 
 from livebode.configuration import recorded_configuration
 from livebode.core import BaselineError, Lines, LivebodeError, MatrixResponses, counted
-from livebode.mimo import mean_matrix
+from livebode.fitting import mean_matrix
 from livebode.records import RunRecord
 from livebode_matrix.settings import MatrixSettings
 
@@ -37,7 +37,7 @@ class MatrixBaseline:
 
     @classmethod
     def load(cls, path: Path) -> MatrixBaseline:
-        """Of the run in this directory; BaselineError if there is none, or it has no valid matrices."""
+        """The run in this directory as a baseline; BaselineError if there is none, or it has no valid matrices."""
         if not path.exists():
             raise BaselineError("absent", f"there is no baseline {str(path)!r}", _NAME_A_RUN, path=str(path))
         try:

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Floats
 from livebode.core import FitError, GridError, MatrixResponses, needing, widened
+from livebode.fitting import mean_matrix
 from livebode.language import Message
-from livebode.mimo import mean_matrix
 from livebode_matrix.line_correlation import INDEPENDENT, LineCorrelation, RowSteps
 
 ALPHA = 0.01
@@ -43,7 +43,7 @@ class EntryChange:
 
     @property
     def sentence(self) -> str:
-        """As text."""
+        """The change in words."""
         return Message(
             "response {output}/{input} changed at {line_hz:g} Hz by {percent:.3g} ± {bound:.2g} %",
             output=self.output,
@@ -131,7 +131,7 @@ def compare_matrices(
     if steps is None:
         steps = RowSteps.of(before).joined(RowSteps.of(after))
     pair = MatrixPair.of(mean_matrix(before), mean_matrix(after), steps)
-    entries = sorted(pair.entries(), key=lambda one: one.probability)
+    entries = sorted(pair.entries(), key=lambda entry: entry.probability)
     return MatrixChange(pair.probability, alpha, len(pair.frequency_hz), tuple(entries))
 
 
@@ -169,7 +169,7 @@ class MatrixPair:
 
     @classmethod
     def of(cls, before: MatrixResponses, after: MatrixResponses, steps: RowSteps) -> MatrixPair:
-        """Of two matrices of one row each."""
+        """The difference of two matrices of one row each."""
         same = (before.outputs, before.inputs) == (after.outputs, after.inputs)
         a, b = before.lines, after.lines
         if not same or not a.alike(b):
@@ -182,7 +182,10 @@ class MatrixPair:
         if not use.any():
             raise FitError("too-few-lines", "no line has all its columns valid in both matrices",
                            "see why() for the reasons", lines=0)  # fmt: skip
-        parts = [(one.noise[0, use], one.spread[0, use], float(one.dof[0])) for one in (before, after)]
+        parts = [
+            (responses.noise[0, use], responses.spread[0, use], float(responses.dof[0]))
+            for responses in (before, after)
+        ]
         scales = [np.einsum("kii->k", spread).real for _, spread, _ in parts]
         noises = [scale[:, None, None] * noise for scale, (noise, _, _) in zip(scales, parts)]
         power = [np.einsum("koo->k", noise).real for noise in noises]
@@ -221,13 +224,13 @@ class MatrixPair:
     @property
     def sigma(self) -> Floats:
         """Standard deviation of each difference, shape of `difference`."""
-        noise, spread = (np.einsum("kjj->kj", one).real for one in (self.noise, self.spread))
+        noise, spread = (np.einsum("kjj->kj", values).real for values in (self.noise, self.spread))
         return np.asarray(np.sqrt(noise[:, :, np.newaxis] * spread[:, np.newaxis, :]))
 
     def entries(self) -> list[EntryChange]:
         """Each entry by itself."""
         radius = self._radius
-        found = []
+        changes = []
         for o, output in enumerate(self.outputs):
             for i, name in enumerate(self.inputs):
                 part = (slice(None), slice(o, o + 1), slice(i, i + 1))
@@ -236,20 +239,20 @@ class MatrixPair:
                 alike = self._alike(self.steps.entry(o, i), slice(o, o + 1), slice(i, i + 1))
                 chance = tail(total, len(self.frequency_hz), 1, 1, self.dof, alike)
                 off = np.abs(self.difference[:, o, i])
-                at = int(np.argmax(off / radius[:, o, i]))
-                size = self.size[at, o, i]
-                line = float(self.frequency_hz[at])
-                found.append(EntryChange(output, name, chance, line, off[at] / size, radius[at, o, i] / size))
-        return found
+                index = int(np.argmax(off / radius[:, o, i]))
+                size = self.size[index, o, i]
+                line = float(self.frequency_hz[index])
+                changes.append(EntryChange(output, name, chance, line, off[index] / size, radius[index, o, i] / size))
+        return changes
 
     def share(self, entry: str, frequency_hz: float) -> tuple[float, float]:
         """|change|/|before| of an entry "output/input" at a line, with its bound; NaN where that is not valid."""
         names = [f"{o}/{i}" for o in self.outputs for i in self.inputs]
         o, i = divmod(names.index(entry), len(self.inputs))
-        at = np.flatnonzero(self.frequency_hz == frequency_hz)
-        if not at.size:
+        index = np.flatnonzero(self.frequency_hz == frequency_hz)
+        if not index.size:
             return np.nan, np.nan
-        k = int(at[0])
+        k = int(index[0])
         size = self.size[k, o, i]
         return float(abs(self.difference[k, o, i]) / size), float(self._radius[k, o, i] / size)
 

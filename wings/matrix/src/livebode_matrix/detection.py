@@ -37,8 +37,8 @@ class MatrixDetection(BaselineComparison["MatrixMonitor"]):
     def _result(self, monitor: MatrixMonitor) -> dict[str, Any]:
         from livebode.monitoring import result_sentence  # with the simulation
 
-        found = monitor.summary()
-        return found | {"message": result_sentence(found) if found["judged_s"] else _NOT_JUDGED}
+        result = monitor.summary()
+        return result | {"message": result_sentence(result) if result["judged_s"] else _NOT_JUDGED}
 
 
 def matrix_detection(axis: Axis, settings: MatrixSettings) -> MatrixDetection:

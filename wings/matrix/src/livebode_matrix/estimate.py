@@ -42,7 +42,7 @@ class Windows:
 
 @dataclass(frozen=True, eq=False)
 class MatrixEstimate:
-    """As in MatrixResponses."""
+    """Matrices of some rows; the attributes are those of MatrixResponses."""
 
     value: Complex
     noise: Complex
@@ -81,9 +81,14 @@ def estimate(windows: Windows, average: bool, condition_max: float) -> MatrixEst
     solution = _solution(d, r, kept, reason)
     value = y @ solution
     known = np.where(reason[:, :, None, :] == 0, value, 0.0)
-    rest = np.concatenate([np.tile(np.eye(outputs), (*value.shape[:2], 1, 1)), -known], axis=3)
+    to_outputs = np.concatenate([np.tile(np.eye(outputs), (*value.shape[:2], 1, 1)), -known], axis=3)
     with np.errstate(invalid="ignore", divide="ignore"):
-        noise = rest @ scatter @ _star(rest) / np.where((dof > 0) & (used > 0), dof, np.nan)[:, None, None, None]
+        noise = (
+            to_outputs
+            @ scatter
+            @ _star(to_outputs)
+            / np.where((dof > 0) & (used > 0), dof, np.nan)[:, None, None, None]
+        )
         own = np.maximum(np.einsum("rkoo->rko", noise).real, 0.0)
         number = experiments * (1 if windows.reference is None else np.maximum(used, 1))
         signal = np.sum(np.abs(known @ d) ** 2, axis=3) / np.reshape(number, (-1, 1, 1))
@@ -94,7 +99,7 @@ def estimate(windows: Windows, average: bool, condition_max: float) -> MatrixEst
 
 
 def _mean(spectra: Complex, used: NDArray[np.int64]) -> Complex:
-    """Of each experiment over the repetitions, shape (rows, lines, signals, experiments)."""
+    """The mean of each experiment over its repetitions, shape (rows, lines, signals, experiments)."""
     return np.asarray(_only(spectra, used).sum(axis=2) / np.maximum(used, 1)[:, None, None, None])
 
 
@@ -164,7 +169,7 @@ def separates(excitation: Complex, condition_max: float) -> Flags:
 def _solution(d: Complex, r: Complex, kept: Complex, reason: NDArray[np.int8]) -> Complex:
     """P = R*·S_dr⁻¹, shape (rows, lines, windows, inputs); NaN in columns that are invalid."""
     whole = (reason == 0).all(axis=2)
-    found = np.full((*d.shape[:2], d.shape[3], d.shape[2]), complex(np.nan, np.nan))
+    solution = np.full((*d.shape[:2], d.shape[3], d.shape[2]), complex(np.nan, np.nan))
     cross = d @ _star(r)
     square = cross.shape[2] == cross.shape[3]
     every = bool(whole.all())
@@ -174,7 +179,7 @@ def _solution(d: Complex, r: Complex, kept: Complex, reason: NDArray[np.int8]) -
         solved = _star(some[1]) @ inverse
         if every:
             return np.asarray(solved)
-        found[whole] = solved
+        solution[whole] = solved
     part = ~whole & (reason != 1).all(axis=2)
     if part.any():
         seen = kept[part] @ d[part]
@@ -183,5 +188,5 @@ def _solution(d: Complex, r: Complex, kept: Complex, reason: NDArray[np.int8]) -
         unit = np.broadcast_to((1 / np.where(size > 0, size, 1.0))[:, np.newaxis], reason.shape)[part]
         inverse = np.linalg.pinv((unit[..., None] * seen) @ _star(r[part]), rcond=_RANK)
         columns = _star(r[part]) @ inverse * unit[:, None, :]
-        found[part] = np.where((reason[part] == 0)[:, None, :], columns, np.nan)
-    return found
+        solution[part] = np.where((reason[part] == 0)[:, None, :], columns, np.nan)
+    return solution

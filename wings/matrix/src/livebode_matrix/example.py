@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from livebode.core import Lines, MatrixResponses
-from livebode.mimo import MatrixExcitation
+from livebode.excitation import MatrixExcitation
 from livebode.simulation import GantryLoop
 from livebode_matrix.settings import MatrixSettings
 from livebode_matrix.tracker import MatrixTracker

@@ -7,8 +7,8 @@ from collections.abc import Callable
 import numpy as np
 
 from livebode.core import Lines
+from livebode.excitation import MatrixExcitation
 from livebode.interface import Example, table_of
-from livebode.mimo import MatrixExcitation
 from livebode.simulation import Gantry, GantryLoop
 from livebode.tables import Table
 
@@ -48,7 +48,7 @@ MATRIX_EXAMPLES = {
         ("gantry-tune.toml",),
         (
             "livebode run gantry-tune.toml",
-            "livebode check-loop runs/gantry-tune",
+            "livebode validate runs/gantry-tune --loop",
             "livebode tune runs/gantry-tune --entry velocity1/u1",
         ),
         package="livebode_matrix",

@@ -45,7 +45,7 @@ class Cause:
 
     @property
     def sentence(self) -> Message:
-        """As text."""
+        """The cause in words."""
         if self.part == CART_PLACE:
             return Message(
                 "the cart is {distance:.3g} ± {bound:.2g} m from its specified place",
@@ -105,13 +105,13 @@ class GantryChange:
     @property
     def sentences(self) -> list[str]:
         """The result as text."""
-        found: list[str] = [cause.sentence for cause in self.causes]
-        if self.moved and len(found) == 1:
-            return [Message("{change}: compare at the same place, or specify the place of the cart", change=found[0])]
+        changes: list[str] = [cause.sentence for cause in self.causes]
+        if self.moved and len(changes) == 1:
+            return [Message("{change}: compare at the same place, or specify the place of the cart", change=changes[0])]
         if self.entries is not None and self.entries.changed:
-            found.append(self.entries.sentence)
+            changes.append(self.entries.sentence)
         percent = 100 * self.alpha
-        return found or [Message("no parameter of the gantry changed (false alarms {percent:g} %)", percent=percent)]
+        return changes or [Message("no parameter of the gantry changed (false alarms {percent:g} %)", percent=percent)]
 
 
 def compare_gantries(
@@ -173,8 +173,8 @@ def compare_gantries(
     probability = _tail(_square(difference, covariance), len(difference), noise_dof)
     judged = entries.changed if entries is not None else probability < alpha
     known = _Known(first, covariance, first.covariance + second.covariance, kilograms, places[1], noise_dof)
-    found = _causes(difference, known, alpha) if judged else []
-    return GantryChange(entries, probability, alpha, tuple(found), (first, second))
+    causes = _causes(difference, known, alpha) if judged else []
+    return GantryChange(entries, probability, alpha, tuple(causes), (first, second))
 
 
 class _Known(NamedTuple):
@@ -193,18 +193,18 @@ class _Known(NamedTuple):
 
 def _causes(difference: Floats, known: _Known, alpha: float) -> list[Cause]:
     """The changes that explain the difference, the largest first."""
-    found: list[Cause] = []
+    causes: list[Cause] = []
     left, names = difference, list(dict(_directions(known)))
-    while len(found) < _CAUSES_MAX:
+    while len(causes) < _CAUSES_MAX:
         tried = [_explained(name, left, known) for name in names]
-        best, rest = max(tried, key=lambda one: one[0].explained)
+        best, remainder = max(tried, key=lambda attempt: attempt[0].explained)
         # The best of many candidates is the largest of as many random values.
         if _tail(best.explained, 1, known.noise_dof) > alpha / len(tried):
             break
-        found.append(best)
-        left = rest
+        causes.append(best)
+        left = remainder
         names.remove(best.part)
-    return found
+    return causes
 
 
 def _explained(name: str, difference: Floats, known: _Known) -> tuple[Cause, Floats]:
@@ -249,10 +249,10 @@ def _before(name: str, known: _Known) -> tuple[float, str]:
 
 
 def _vector(parts: dict[int, float]) -> Floats:
-    found = np.zeros(len(PARAMETERS))
+    vector = np.zeros(len(PARAMETERS))
     for i, value in parts.items():
-        found[i] = value
-    return found
+        vector[i] = value
+    return vector
 
 
 def _scaled(values: Floats, covariance: Floats) -> Floats:
@@ -270,7 +270,7 @@ def _square(difference: Floats, covariance: Floats) -> float:
 
 
 def _tail(square: float, parameters: int, noise_dof: float) -> float:
-    """Of F: the covariance is that of estimated noise."""
+    """Probability of a larger value by chance, of the distribution F: the covariance is that of estimated noise."""
     with needing("SciPy", "analysis", "a comparison of matrices"):
         from scipy.special import fdtrc
 

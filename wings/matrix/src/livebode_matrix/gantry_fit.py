@@ -11,7 +11,7 @@ from livebode.core import MatrixResponses, UsageError, needing, normal_quantile
 from livebode.language import Message
 from livebode.simulation import Gantry
 from livebode_matrix.least_squares import minimise
-from livebode_matrix.whitening import Weighted
+from livebode_matrix.whitening import WeightedMatrix
 
 PARAMETERS = (
     (Message("motor inertia"), "kg m²"),
@@ -109,10 +109,10 @@ def fit_gantry(
 
     Examples
     --------
-    >>> from livebode.mimo import MatrixExcitation
+    >>> from livebode.excitation import MatrixExcitation
     >>> from livebode_matrix import example_matrix_responses
-    >>> found = fit_gantry(example_matrix_responses(), Gantry())
-    >>> abs(found["left belt's stiffness"] - 4e5) < 2 * found.bound("left belt's stiffness")
+    >>> fit = fit_gantry(example_matrix_responses(), Gantry())
+    >>> abs(fit["left belt's stiffness"] - 4e5) < 2 * fit.bound("left belt's stiffness")
     True
     """
     if (len(responses.outputs), len(responses.inputs)) != (2, 2):
@@ -123,14 +123,15 @@ def fit_gantry(
             "track two inputs and two outputs, the left motor first",
             argument="responses",
         )
-    weighted = Weighted.of(responses, band_hz)
+    weighted = WeightedMatrix.of(responses, band_hz)
     start = parameters_of(description)
     size = np.where(start == 0, start[MASS] * description.half_width_m, start)
     model = _Model(description, weighted.frequency_hz, responses.lines.rate_hz, size)
-    found = minimise(weighted, model.response, model.slopes, start / size)
+    solution = minimise(weighted, model.response, model.slopes, start / size)
     return GantryFit(
-        description, found.values * size, found.covariance * np.outer(size, size),
-        found.independent * np.outer(size, size), found.epsilon, found.chi2, found.dof, weighted.dof, found.settled,
+        description, solution.values * size, solution.covariance * np.outer(size, size),
+        solution.independent * np.outer(size, size), solution.epsilon, solution.chi2, solution.dof, weighted.dof,
+        solution.settled,
     )  # fmt: skip
 
 
@@ -171,13 +172,13 @@ class _Model:
         return np.asarray(self._responses((x * self._size)[np.newaxis])[0])
 
     def slopes(self, x: Floats) -> Complex:
-        """By central differences, shape (lines, entries, parameters)."""
+        """Derivatives by central differences, shape (lines, entries, parameters)."""
         steps = _STEP * np.eye(x.size)
         responses = self._responses(np.concatenate([x + steps, x - steps]) * self._size)
         return np.moveaxis((responses[: x.size] - responses[x.size :]) / (2 * _STEP), 0, -1)
 
     def _responses(self, values: Floats) -> Complex:
-        """Of parameters (sets, 11), shape (sets, lines, entries)."""
+        """Responses for sets of parameters (sets, 11), shape (sets, lines, entries)."""
         with needing("SciPy", "analysis", "a fit of matrices"):
             from scipy.linalg import expm
 
@@ -212,7 +213,7 @@ class _Model:
 
 
 def _at(name: str) -> int:
-    names = [one for one, _ in PARAMETERS]
+    names = [name for name, _ in PARAMETERS]
     if name not in names:
         raise UsageError(
             "unknown-name", f"a gantry has no parameter {name!r}", f"choose {' or '.join(map(repr, names))}",

@@ -9,7 +9,7 @@ import numpy as np
 
 from livebode.arrays import Complex, Floats
 from livebode.core import needing, normal_quantile
-from livebode_matrix.whitening import Weighted, stacked
+from livebode_matrix.whitening import WeightedMatrix, stacked
 
 Model = Callable[[Floats], Complex]
 """At parameters: the response (lines, entries), or its slopes (lines, entries, parameters)."""
@@ -48,24 +48,24 @@ class MatrixMinimum:
     settled: bool
 
 
-def minimise(weighted: Weighted, model: Model, slopes: Model, start: Floats) -> MatrixMinimum:
+def minimise(weighted: WeightedMatrix, model: Model, slopes: Model, start: Floats) -> MatrixMinimum:
     """Fit from a start near the minimum, and again with the ε with which reduced chi² is 1."""
     dof = float(max(weighted.count - start.size, 1))
-    epsilon, found, settled = 0.0, start, False
+    epsilon, values, settled = 0.0, start, False
     for _ in range(_ROUNDS):
-        found, settled = _searched(weighted, model, slopes, weighted.part(epsilon)[0], found)
-        response = model(found)
+        values, settled = _searched(weighted, model, slopes, weighted.part(epsilon)[0], values)
+        response = model(values)
         before, epsilon = epsilon, _epsilon(weighted, response, dof)
         if abs(epsilon - before) <= _SAME * epsilon:
             break
     inverse, share = weighted.part(epsilon)
-    response, whole = model(found), inverse @ slopes(found)
+    response, whole = model(values), inverse @ slopes(values)
     alone = _inverse(stacked(whole).reshape(-1, start.size))
     covariance = _over_lines(weighted, inverse, whole, alone) if np.isfinite(alone).all() else alone
     chi2 = _chi2(_rest(weighted, response, weighted.part(0.0)[0]))
     widened = 1 + (weighted.scatter - 1) * share
     return MatrixMinimum(
-        found, covariance * widened, alone * widened, epsilon, chi2, dof, weighted.value - response, settled
+        values, covariance * widened, alone * widened, epsilon, chi2, dof, weighted.value - response, settled
     )
 
 
@@ -78,7 +78,7 @@ def _inverse(slope: Floats) -> Floats:
         return np.full((scale.size, scale.size), np.inf)
 
 
-def _over_lines(weighted: Weighted, inverse: Complex, whole: Complex, alone: Floats) -> Floats:
+def _over_lines(weighted: WeightedMatrix, inverse: Complex, whole: Complex, alone: Floats) -> Floats:
     """Covariance of the parameters with errors that are alike at neighbouring lines, of weighted slopes `whole`.
 
     The errors that the rows of the recording show are taken through the fit. Products of lines that are further apart
@@ -107,7 +107,9 @@ def _over_lines(weighted: Weighted, inverse: Complex, whole: Complex, alone: Flo
     return np.asarray((total + alone - of_noise) * np.outer(few, few))
 
 
-def _searched(weighted: Weighted, model: Model, slopes: Model, inverse: Complex, start: Floats) -> tuple[Floats, bool]:
+def _searched(
+    weighted: WeightedMatrix, model: Model, slopes: Model, inverse: Complex, start: Floats
+) -> tuple[Floats, bool]:
     """Parameters at the minimum with these weights, and whether the search converged."""
     with needing("SciPy", "analysis", "a fit of matrices"):
         from scipy.optimize import least_squares
@@ -119,22 +121,22 @@ def _searched(weighted: Weighted, model: Model, slopes: Model, inverse: Complex,
         return -stacked(inverse @ slopes(x)).reshape(-1, x.size)
 
     with np.errstate(all="ignore"):
-        found = least_squares(
+        solution = least_squares(
             rest, start, jacobian, method="lm", x_scale="jac", max_nfev=_EVALUATIONS, xtol=_TOLERANCE,
             ftol=_TOLERANCE, gtol=_TOLERANCE,
         )  # fmt: skip
-    return np.asarray(found.x), bool(found.success)
+    return np.asarray(solution.x), bool(solution.success)
 
 
-def _rest(weighted: Weighted, response: Complex, inverse: Complex) -> Complex:
+def _rest(weighted: WeightedMatrix, response: Complex, inverse: Complex) -> Complex:
     return np.asarray(np.einsum("kij,kj->ki", inverse, weighted.value - response))
 
 
-def _chi2(rest: Complex) -> float:
-    return 2 * float(np.sum(np.abs(rest) ** 2))
+def _chi2(residual: Complex) -> float:
+    return 2 * float(np.sum(np.abs(residual) ** 2))
 
 
-def _epsilon(weighted: Weighted, response: Complex, dof: float) -> float:
+def _epsilon(weighted: WeightedMatrix, response: Complex, dof: float) -> float:
     """ε ≥ 0 with chi² = dof."""
 
     def left(epsilon: float) -> float:

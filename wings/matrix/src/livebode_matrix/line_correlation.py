@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Flags, Floats
 from livebode.core import MatrixResponses
-from livebode.mimo import mean_matrix
+from livebode.fitting import mean_matrix
 
 _STEPS_MIN, _STEPS_MAX = 10, 128
 _MARGIN = 2.0  # standard deviations
@@ -88,19 +88,20 @@ class RowSteps:
         return RowSteps(np.concatenate([self.step, other.step]), independent)
 
     def entry(self, output: int, input: int) -> RowSteps:
-        """Those of one entry."""
+        """The steps of one entry."""
         return RowSteps(self.step[:, :, output : output + 1, input : input + 1], self.independent)
 
     def correlation(self, use: Flags, noise: Complex, spread: Complex) -> LineCorrelation:
-        """Of errors with the covariance noise ⊗ spread at the lines in `use`; the largest where steps are too few.
+        """Correlation between lines of errors with the covariance noise ⊗ spread at the lines in `use`.
 
-        By the sums over pairs and triples of independent steps, which are unbiased, plus two standard deviations:
-        what is underestimated here becomes false alarms far out in the tail.
+        It is estimated by the sums over pairs and triples of independent steps, which are unbiased, plus two standard
+        deviations: what is underestimated here becomes false alarms far out in the tail. It is the largest where steps
+        are too few.
         """
         lines = int(np.count_nonzero(use))
         if len(self.step) < _STEPS_MIN or lines < 2:
             return LineCorrelation.largest(lines)
-        left, right = (np.linalg.inv(np.linalg.cholesky(one)) for one in (noise, spread))
+        left, right = (np.linalg.inv(np.linalg.cholesky(covariance)) for covariance in (noise, spread))
         apart = np.einsum("kpo,rkoi,kji->rkpj", left, self.step[:, use], right).reshape(len(self.step), -1)
         second, third = _with_margin((apart @ apart.conj().T).real, self.independent, apart.shape[1])
         second = max(second, 1.0)
@@ -111,21 +112,21 @@ def _with_margin(products: Floats, independent: Flags, errors: int) -> tuple[flo
     """2·tr R² and 4·tr R³ over the number of errors, of their products, each larger by its uncertainty (jackknife)."""
     member = independent.astype(np.float64)
     of_pairs, of_triples = (products * member) ** 2, products * member
-    cubes, members = (np.diag(one @ one @ one) for one in (of_triples, member))
+    cubes, members = (np.diag(matrix @ matrix @ matrix) for matrix in (of_triples, member))
     steps = len(member)
     # Without one step after the other, and with all; in a triple each of three may be the step that is missing.
     weights = np.vstack([np.ones((steps, steps)) - np.eye(steps), np.ones(steps)])
     missing = 1 - weights
     power = weights @ np.diag(products) / weights.sum(axis=1)
-    pairs, pair_count = (one.sum() - 2 * missing @ one.sum(axis=1) for one in (of_pairs, member))
-    triples, triple_count = (one.sum() - 3 * missing @ one for one in (cubes, members))
+    pairs, pair_count = (matrix.sum() - 2 * missing @ matrix.sum(axis=1) for matrix in (of_pairs, member))
+    triples, triple_count = (matrix.sum() - 3 * missing @ matrix for matrix in (cubes, members))
     second = 2 * errors * pairs / np.maximum(pair_count, 1) / power**2
     third = 4 * errors**2 * triples / np.maximum(triple_count, 1) / power**3
-    found = [all_of[-1] + _MARGIN * np.sqrt((steps - 1) * np.var(all_of[:-1])) for all_of in (second, third)]
-    return float(found[0]), float(found[1])
+    bounds = [all_of[-1] + _MARGIN * np.sqrt((steps - 1) * np.var(all_of[:-1])) for all_of in (second, third)]
+    return float(bounds[0]), float(bounds[1])
 
 
-def _overlap(one: NDArray[np.int64], other: NDArray[np.int64]) -> Flags:
-    """Which spans first … stop − 1 share a sample, shape (one, other)."""
-    begin = np.maximum(one[:, np.newaxis, 0], other[:, 0])
-    return np.asarray(begin < np.minimum(one[:, np.newaxis, 1], other[:, 1]))
+def _overlap(windows: NDArray[np.int64], others: NDArray[np.int64]) -> Flags:
+    """Which windows first … stop − 1 share a sample, shape (windows, others)."""
+    begin = np.maximum(windows[:, np.newaxis, 0], others[:, 0])
+    return np.asarray(begin < np.minimum(windows[:, np.newaxis, 1], others[:, 1]))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
@@ -9,10 +10,96 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Floats
 from livebode.core import FitError, MatrixResponses, Parameters, Responses
-from livebode.fitting import CommonPoles, Hold, Kind, Separated, assembled, check_model, outputs_of, search
-from livebode_matrix.mode_choice import chosen
+from livebode.fitting import (
+    CommonPoles,
+    Hold,
+    Kind,
+    Outputs,
+    SeparatedFit,
+    assembled,
+    check_model,
+    outputs_of,
+    pole_price,
+    possible,
+    reduced_structures,
+    search,
+    solve,
+)
+from livebode_matrix.least_squares import MatrixMinimum
 from livebode_matrix.refinement import refined
-from livebode_matrix.whitening import Weighted
+from livebode_matrix.whitening import WeightedMatrix
+
+ModeFit = tuple[SeparatedFit, MatrixMinimum]
+
+_ROUNDS = 2
+_HOPELESS = 200.0  # by how much more a structure costs with independent entries that is not fitted again
+
+
+def chosen(
+    weighted: WeightedMatrix, outs: Outputs, begun: Sequence[SeparatedFit], kind: Kind, *, fixed: bool
+) -> list[ModeFit]:
+    """Fits by increasing cost, the first without the terms that do not lower it.
+
+    A search with independent entries takes noise that they share for a pole: outputs whose noise is alike, and the
+    columns of an output, which contain the same noise, show it again and again. Here all are fitted and compared by the
+    likelihood of the whole matrix.
+
+    Parameters
+    ----------
+    begun
+        Fits with independent entries.
+    fixed
+        Whether the number of poles remains.
+    """
+
+    def fitted(start: SeparatedFit) -> ModeFit:
+        modes, minimum = refined(weighted, outs, start)
+        return replace(modes, cost=_cost(weighted, modes, minimum)), minimum
+
+    fits = sorted((fitted(start) for start in begun), key=_by_cost)
+    while fits:
+        of = fits[0][0]
+        limit = solve(outs, of.structure, of.theta, rounds=_ROUNDS).cost + _HOPELESS
+        smaller = [
+            solve(outs, structure, theta, rounds=_ROUNDS)
+            for structure, theta in reduced_structures(of, kind, fixed=fixed)
+            if outs.enough_for(structure)
+        ]
+        rivals = [fitted(candidate) for candidate in smaller if candidate.cost < limit]
+        rivals = [rival for rival in rivals if possible(outs, rival[0], kind)]
+        best = min(rivals, key=_by_cost, default=fits[0])
+        if not best[0].cost < fits[0][0].cost:
+            break
+        fits[0] = best
+    return fits
+
+
+def _by_cost(fit: ModeFit) -> tuple[bool, float]:
+    return not fit[0].settled, fit[0].cost
+
+
+def _cost(weighted: WeightedMatrix, of: SeparatedFit, minimum: MatrixMinimum) -> float:
+    """−2·ln(likelihood) and the price of the parameters, as that of `SeparatedFit`.
+
+    Noise whose covariance is estimated makes the errors of a line a complex matrix of Student's distribution: (d + m)·
+    ln det(I + N⁻¹·E·S⁻¹·E*/d) + m·ln det N, for m inputs (Gupta and Nagar, Matrix Variate Distributions, 2000, ch. 4).
+    The model error adds to N its mean over the inputs in units of S, and d grows as the share of noise falls.
+    """
+    lines, entries = weighted.value.shape
+    inputs = weighted.spread.shape[1]
+    shape = (lines, weighted.outputs, inputs)
+    error = minimum.error.reshape(shape)
+    own = np.einsum("kii->ki", weighted.spread).real[:, np.newaxis]
+    size = np.mean(np.abs(weighted.value.reshape(shape)) ** 2 / own, axis=2)
+    total = weighted.noise + minimum.epsilon**2 * size[:, :, np.newaxis] * np.eye(weighted.outputs)
+    share = np.einsum("koo->k", np.linalg.solve(total, weighted.noise)).real.mean() / weighted.outputs
+    dof = weighted.dof / share**2
+    square = error @ np.linalg.solve(weighted.spread.conj(), np.swapaxes(error, 1, 2).conj())
+    unit = np.eye(weighted.outputs) + np.linalg.solve(total, square) / dof
+    likely = 2 * (dof + inputs) * np.linalg.slogdet(unit)[1] + 2 * inputs * np.linalg.slogdet(total)[1]
+    structure = of.structure
+    price = pole_price(lines, 2 * lines * entries * (1 - share))
+    return float(likely.sum() + structure.size * np.log(2 * lines * entries) + structure.poles * price)
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +128,7 @@ class MatrixModes(CommonPoles):
         """
         names = tuple(dict.fromkeys(entry.rpartition("/")[0] for entry in self.outputs))
         modes = range(len(self.residues))
-        shown = [f"{what}_{r + 1} {name}" for r in modes for what in ("shape", "shape phase") for name in names]
+        shown = [f"{word}_{r + 1} {name}" for r in modes for word in ("shape", "shape phase") for name in names]
         units = [unit for _ in modes for unit in ("", "°") for _ in names]
         largest = np.argmax(np.abs(_shapes(self.residues)), axis=1)
 
@@ -118,12 +205,12 @@ def fit_matrix(
     Examples
     --------
     >>> from livebode_matrix import example_matrix_responses
-    >>> found = fit_matrix(example_matrix_responses(), order=2)
-    >>> found.status, found.order, found.outputs
+    >>> fit = fit_matrix(example_matrix_responses(), order=2)
+    >>> fit.status, fit.order, fit.outputs
     ('ok', 2, ('velocity1/u1', 'velocity1/u2', 'velocity2/u1', 'velocity2/u2'))
     """
     check_model(model, order)
-    weighted = Weighted.of(responses, band_hz)
+    weighted = WeightedMatrix.of(responses, band_hz)
     matrix = weighted.mean
     whole = matrix.valid[0].all(axis=1)
     entries = [_entry(matrix, o, i, whole) for o in range(len(matrix.outputs)) for i in range(len(matrix.inputs))]
@@ -136,35 +223,37 @@ def fit_matrix(
         best = chosen(weighted, outs, search(outs, model, order), model, fixed=order is not None)
     specified = order is not None or like is not None
     covariance = best[0][1].covariance if best else None
-    found = assembled(outs, [one for one, _ in best], names, entries, kind, specified=specified, covariance=covariance)
-    given = {field.name: getattr(found, field.name) for field in fields(CommonPoles)}
+    fitted = assembled(
+        outs, [modes for modes, _ in best], names, entries, kind, specified=specified, covariance=covariance
+    )
+    given = {field.name: getattr(fitted, field.name) for field in fields(CommonPoles)}
     return MatrixModes(**given, size=(len(matrix.outputs), len(matrix.inputs)))
 
 
 def _entry(matrix: MatrixResponses, output: int, input: int, whole: NDArray[np.bool_]) -> Responses:
-    found = matrix.entry(output, input)
-    return replace(found, valid=found.valid & whole)
+    entry = matrix.entry(output, input)
+    return replace(entry, valid=entry.valid & whole)
 
 
-def _started(like: MatrixModes, names: tuple[str, ...]) -> Separated:
-    if like.found is None or like.status != "ok" or like.outputs != names:
+def _started(like: MatrixModes, names: tuple[str, ...]) -> SeparatedFit:
+    if like.best is None or like.status != "ok" or like.outputs != names:
         raise FitError(
             "not-fitted",
             "the earlier fit is not valid, or is of other entries",
             "leave `like` out, so that the poles are searched for",
             status=like.status,
         )
-    return like.found
+    return like.best
 
 
 def _residues(names: tuple[str, ...], values: Floats, entries: tuple[str, ...]) -> Complex:
     """From quantities (..., names), shape (..., modes, entries)."""
     modes = sum(name.startswith("frequency_") for name in names)
-    at = [[names.index(f"{what}_{r + 1} {entry}") for r in range(modes) for entry in entries]
-          for what in ("residue", "phase")]  # fmt: skip
-    size, phase = (values[..., np.array(one, dtype=np.intp)] for one in at)
-    found: Complex = np.asarray(size * np.exp(1j * np.radians(phase)), dtype=np.complex128)
-    return found.reshape(*values.shape[:-1], modes, len(entries))
+    places = [[names.index(f"{word}_{r + 1} {entry}") for r in range(modes) for entry in entries]
+          for word in ("residue", "phase")]  # fmt: skip
+    size, phase = (values[..., np.array(columns, dtype=np.intp)] for columns in places)
+    residues: Complex = np.asarray(size * np.exp(1j * np.radians(phase)), dtype=np.complex128)
+    return residues.reshape(*values.shape[:-1], modes, len(entries))
 
 
 def _shapes(residues: Complex) -> Complex:

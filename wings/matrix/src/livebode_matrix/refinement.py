@@ -7,15 +7,15 @@ from dataclasses import replace
 import numpy as np
 
 from livebode.arrays import Complex, Floats
-from livebode.fitting import Outputs, PartialFractions, Separated, Structure
+from livebode.fitting import Outputs, PartialFractions, SeparatedFit, Structure
 from livebode_matrix.least_squares import MatrixMinimum, minimise
-from livebode_matrix.whitening import Weighted
+from livebode_matrix.whitening import WeightedMatrix
 
 _TICK_STEP = 1e-4  # of a tick, for the slope by a delay
 
 
-def refined(weighted: Weighted, outs: Outputs, of: Separated) -> tuple[Separated, MatrixMinimum]:
-    """The same structure from its parameters on, fitted with the covariance of the entries; its cost is unchanged."""
+def refined(weighted: WeightedMatrix, outs: Outputs, of: SeparatedFit) -> tuple[SeparatedFit, MatrixMinimum]:
+    """A structure, from its parameters on, fitted with the covariance of the entries; its cost is unchanged."""
     structure = of.structure
     shapes = PartialFractions(structure, outs.grid._replace(frequency_hz=weighted.frequency_hz), outs.unit)
     minimum = minimise(
@@ -33,7 +33,7 @@ def _parts(of: Structure, raw: Floats) -> tuple[Floats, Floats]:
 
 
 def _response(shapes: PartialFractions, of: Structure, raw: Floats) -> Complex:
-    """Of all entries, shape (lines, entries)."""
+    """Response of all entries, shape (lines, entries)."""
     theta, linear = _parts(of, raw)
     if not of.delays:
         return np.asarray(shapes.columns(theta, 0.0) @ linear.T)
@@ -57,7 +57,7 @@ def _slopes(shapes: PartialFractions, of: Structure, raw: Floats) -> Complex:
     return slope
 
 
-def _separated(of: Separated, outs: Outputs, minimum: MatrixMinimum) -> Separated:
+def _separated(of: SeparatedFit, outs: Outputs, minimum: MatrixMinimum) -> SeparatedFit:
     structure = of.structure
     theta, linear = _parts(structure, minimum.values)
     response = _response(PartialFractions(structure, outs.grid, outs.unit), structure, minimum.values).T

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from livebode.configuration import Axis
 from livebode.core import (
+    REASONS,
     Block,
     Channel,
     ConfigError,
@@ -20,7 +21,9 @@ from livebode.core import (
     MatrixResponses,
     PlantKinds,
     SignalError,
+    Stage,
     Stateful,
+    StatefulBase,
 )
 from livebode.estimation import nearest_hop
 from livebode.preparation import LIVE_RESPONSES_PER_S, check_length, chosen_part
@@ -43,11 +46,73 @@ from livebode.runtime import (
 )
 from livebode.sources import Log
 from livebode.sources.live import LiveSource
-from livebode_matrix.columns import MatrixColumns
 from livebode_matrix.configuration import matrix_lines, matrix_settings
 from livebode_matrix.detection import MatrixDetection, matrix_detection
 from livebode_matrix.settings import MatrixSettings
 from livebode_matrix.tracker import MatrixTracker
+
+
+class MatrixColumns(StatefulBase):
+    """Counts of each column over a run.
+
+    Parameters
+    ----------
+    inputs
+        Names of the inputs.
+    lines
+        Number of lines.
+    """
+
+    _stage = Stage("matrix-columns", 1)
+    _STATE = ("_counts", "_newest", "_condition")
+
+    def __init__(self, inputs: Sequence[str], lines: int) -> None:
+        self._inputs = tuple(inputs)
+        self._counts = np.zeros((len(inputs), len(REASONS)), dtype=np.int64)
+        self._newest = np.zeros((len(inputs), lines), dtype=np.int64)
+        self._condition = np.full(lines, np.nan)
+
+    @property
+    def _identity(self) -> str:
+        return repr((self._inputs, len(self._condition)))
+
+    @property
+    def valid(self) -> int:
+        """Number of valid values: columns at lines of responses."""
+        return int(self._counts[:, 0].sum())
+
+    def add(self, responses: MatrixResponses) -> None:
+        """Count the columns of these responses."""
+        if not len(responses):
+            return
+        for number in range(len(REASONS)):
+            self._counts[:, number] += np.count_nonzero(responses.reason == number, axis=(0, 1))
+        self._newest = responses.reason[-1].T.astype(np.int64)
+        self._condition = responses.condition[-1].copy()
+
+    def summary(self, frequency_hz: np.ndarray) -> dict[str, Any]:
+        """Entries of run.json: counts of each column, and the newest invalid lines and worst condition.
+
+        Parameters
+        ----------
+        frequency_hz
+            Frequencies of the lines.
+        """
+        columns = []
+        for name, counts, newest in zip(self._inputs, self._counts, self._newest):
+            reasons = {REASONS[i]: int(counts[i]) for i in range(1, len(REASONS)) if counts[i]}
+            invalid = {REASONS[i]: frequency_hz[newest == i].tolist() for i in range(1, len(REASONS))}
+            now = {reason: lines for reason, lines in invalid.items() if lines}
+            columns.append({"input": name, "valid": int(counts[0]), "reasons": reasons, "newest_invalid_hz": now})
+        summary: dict[str, Any] = {"columns": columns}
+        finite = np.flatnonzero(np.isfinite(self._condition))
+        if finite.size:
+            worst = finite[np.argmax(self._condition[finite])]
+            summary["condition"] = {
+                "worst": float(self._condition[worst]),
+                "frequency_hz": float(frequency_hz[worst]),
+            }
+        return summary
 
 
 @dataclass(eq=False)
@@ -147,8 +212,8 @@ class ResponseMatrix(Estimate):
         return True
 
     def describe(self, about: Mapping[str, Any], channels: Sequence[Channel]) -> dict[str, Any]:
-        found = about.get("found", {}) | _found(self.settings, channels)
-        begun = dict(about) | {"matrix": True, "found": found, "versions": versions()}
+        facts = about.get("found", {}) | _found(self.settings, channels)
+        begun = dict(about) | {"matrix": True, "found": facts, "versions": versions()}
         return begun | (self.compared_with if self.detection.baseline is not None else {})
 
     def begin(self, run: RunContext) -> None:
@@ -173,13 +238,13 @@ class ResponseMatrix(Estimate):
         return results.valid
 
     def documents(self, results: MatrixResponses) -> Iterator[Document]:
-        self.columns.take(results)
+        self.columns.add(results)
         if self.readiness is not None:
             self.readiness.left_out(results.sample - self.settings.settled_window + 1, results.sample)
         if len(results):
             self._remember(results)
             yield results
-        if (shedding := self.run.shedding) is not None:
+        if (shedding := self.shedding) is not None:
             shedding.monitors()
             if not shedding.to_monitor(results):
                 return

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from livebode.configuration import FitSection
-from livebode.fitting import Kind
-from livebode.mimo import mean_matrix
+from livebode.fitting import Kind, mean_matrix
 from livebode.records import RunRecord
 from livebode_matrix.modes import MatrixModes, fit_matrix
 
@@ -16,5 +15,5 @@ def fit_matrix_run(
     responses = run.matrix()
     band = None if section.band_hz is None else (section.band_hz[0], section.band_hz[1])
     mean = mean_matrix(responses)
-    found = fit_matrix(responses, model, order=order, band_hz=band, hold=section.hold)
-    return found, [f"fitted to the mean of the matrices that share no window, {mean.dof[0]:.0f} degrees of freedom"]
+    fit = fit_matrix(responses, model, order=order, band_hz=band, hold=section.hold)
+    return fit, [f"fitted to the mean of the matrices that share no window, {mean.dof[0]:.0f} degrees of freedom"]

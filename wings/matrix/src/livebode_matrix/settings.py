@@ -7,9 +7,8 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal
 
-from livebode.core import CHANNELS_MAX, Lines, UsageError
+from livebode.core import CHANNELS_MAX, Lines, MatrixLoop, UsageError
 from livebode.estimation import nearest_hop
-from livebode.mimo import MatrixLoop
 
 Method = Literal["direct", "joint", "indirect"]
 

@@ -13,7 +13,7 @@ ESTIMATES: Mapping[str, Mapping[str, str]] = {
         "recording": "livebode_matrix.response_matrix:examined_matrix",
         "draw": "livebode_matrix.terminal:draw_matrix",
         "show": "livebode_matrix.terminal:show_matrix",
-        "page": "livebode.dashboard.matrix_view:views_of_matrix",
+        "page": "livebode.dashboard.run_feed:views_of_matrix",
         "export": "livebode.cli.export_command:matrices",
     }
 }

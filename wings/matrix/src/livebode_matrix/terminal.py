@@ -54,9 +54,9 @@ def matrix_lines(newest: MatrixResponses) -> list[str]:
                 lines.append(f"{name}  not valid at any line")
                 continue
             size = abs(entry.value[-1, valid])
-            at = int(size.argmax())
-            bound = entry.bound(2.0)[-1, valid][at]
+            peak_index = int(size.argmax())
+            bound = entry.bound(2.0)[-1, valid][peak_index]
             around = f" ± {bound:.2g}" if bound == bound else ", bound not known yet"
-            peak = f"largest {size[at]:.4g}{around} at {entry.lines.frequency_hz[valid][at]:g} Hz"
+            peak = f"largest {size[peak_index]:.4g}{around} at {entry.lines.frequency_hz[valid][peak_index]:g} Hz"
             lines.append(f"{name}  valid at {valid.sum()} of {valid.size} lines, {peak}")
     return lines

@@ -58,7 +58,7 @@ class MatrixTracker(StatefulBase):
 
     >>> import numpy as np
     >>> from livebode.core import Block, Lines
-    >>> from livebode.mimo import MatrixExcitation
+    >>> from livebode.excitation import MatrixExcitation
     >>> from livebode_matrix import MatrixSettings
     >>> lines = Lines.parse("50:150:50", rate_hz=1000, window=100)
     >>> u = np.tile(MatrixExcitation.orthogonal(lines, 2).samples, 3)
@@ -150,15 +150,15 @@ class MatrixTracker(StatefulBase):
         if len(self._aside):
             not_ready = contains(self._aside, rows.sample - s.settled_window + 1, rows.sample)
             rows = replace(rows, clean=rows.clean & ~not_ready)
-        found = self._responses(rows, block)
+        result = self._responses(rows, block)
         hand_over(self._events, emit)
-        return found
+        return result
 
     def _responses(self, rows: SpectraRows, block: Block) -> MatrixResponses:
         s = self.settings
         settled = np.flatnonzero((rows.sample - s.start) % s.span + 1 >= s.first_place)
         sample = rows.sample[settled]
-        found, count = self._estimate(rows, settled)
+        rows_estimate, count = self._estimate(rows, settled)
         used = np.maximum(count, 1) if s.average else np.ones_like(count)
         extent = s.lines.window + np.where(count > 0, s.span * (s.count - 1) + s.cycle * (used - 1), 0)
         middle = sample - (s.lines.window - 1) / 2 - s.span * (s.count - 1) / 2 - s.cycle * (used - 1) / 2
@@ -166,7 +166,7 @@ class MatrixTracker(StatefulBase):
             s.lines,
             tuple(s.output),
             s.columns,
-            **vars(found),
+            **vars(rows_estimate),
             first=sample - extent + 1,
             sample=sample,
             time_s=np.asarray(block.origin_s + middle / block.rate_hz, dtype=np.float64),
@@ -176,11 +176,11 @@ class MatrixTracker(StatefulBase):
     def _estimate(self, rows: SpectraRows, settled: NDArray[np.intp]) -> tuple[MatrixEstimate, NDArray[np.int64]]:
         """Matrices of some rows, and how many repetitions each has."""
         stage, history = self._matrices, MatrixHistory(self._past, self._complete, self._work)
-        found = MatrixRows.empty(stage, len(settled))
-        reason = np.zeros((*found.sure.shape, stage.inputs), dtype=np.int8)
+        result = MatrixRows.empty(stage, len(settled))
+        reason = np.zeros((*result.sure.shape, stage.inputs), dtype=np.int8)
         for begin in range(0, len(settled), _AT_ONCE):
             part = slice(begin, begin + _AT_ONCE)
-            place, some = settled[part].astype(np.int64), found.part(part)
+            place, some = settled[part].astype(np.int64), result.part(part)
             process_matrices(stage, history, MatrixWindows(self._next, rows.spectrum, place, rows.clean), some)
             known = some.complete[:, np.newaxis] > 0
             reason[part][~known[:, 0]] = 1
@@ -189,9 +189,9 @@ class MatrixTracker(StatefulBase):
             if unsure.any():
                 self._replace(some, reason[part], unsure)
             self._next = (self._next + len(place)) % len(self._complete)
-        values = found.value, found.noise, found.spread, found.dof, found.coherence, found.condition
+        values = result.value, result.noise, result.spread, result.dof, result.coherence, result.condition
         own = MatrixEstimate(*values, reason)
-        return (self._through_loop(own) if self.settings.estimator == "indirect" else own), found.complete
+        return (self._through_loop(own) if self.settings.estimator == "indirect" else own), result.complete
 
     def _excited_apart(self, sample: NDArray[np.int64], complete: NDArray[np.int64]) -> Flags:
         """Whether the excitations are different experiments, shape (rows, lines), by the first row of each experiment.
@@ -205,54 +205,54 @@ class MatrixTracker(StatefulBase):
         begins = np.flatnonzero(((sample - s.start) % s.span + 1 == s.first_place) & (complete > 0))
         excitation = self._windows(begins, 1)[:, :, 0, stage.outputs + stage.inputs :]
         known = np.concatenate([self._apart[np.newaxis], separates(excitation, s.condition_max)])
-        found = known[np.searchsorted(begins, np.arange(len(sample)), side="right")]
+        sampled = known[np.searchsorted(begins, np.arange(len(sample)), side="right")]
         self._apart = known[-1]
-        return np.asarray(found)
+        return np.asarray(sampled)
 
-    def _replace(self, found: MatrixRows, reason: NDArray[np.int8], unsure: Flags) -> None:
+    def _replace(self, estimates: MatrixRows, reason: NDArray[np.int8], unsure: Flags) -> None:
         """By the estimate with singular values, where it is not sure that the inputs separate."""
         stage = self._matrices
         rows = np.flatnonzero(unsure.any(axis=1))
         each = max(1, _VALUES_MAX // (stage.experiments * stage.repetitions * self._past[0].size))
-        for at in (rows[i : i + each] for i in range(0, len(rows), each)):
-            exact = self._exact(at, found.complete[at])
+        for part in (rows[i : i + each] for i in range(0, len(rows), each)):
+            exact = self._exact(part, estimates.complete[part])
             which = np.zeros_like(unsure)
-            which[at] = unsure[at]
+            which[part] = unsure[part]
             for name in ("value", "noise", "spread", "coherence", "condition"):
-                getattr(found, name)[which] = getattr(exact, name)[unsure[at]]
-            reason[which] = exact.reason[unsure[at]]
+                getattr(estimates, name)[which] = getattr(exact, name)[unsure[part]]
+            reason[which] = exact.reason[unsure[part]]
 
-    def _exact(self, at: NDArray[np.intp], complete: NDArray[np.int64]) -> MatrixEstimate:
+    def _exact(self, rows: NDArray[np.intp], complete: NDArray[np.int64]) -> MatrixEstimate:
         """The estimate with singular values of rows, counted from the next place in the ring."""
         s, stage = self.settings, self._matrices
-        spectra = self._windows(at, s.memory)
+        spectra = self._windows(rows, s.memory)
         output, denominator, given = np.split(spectra, (stage.outputs, stage.outputs + stage.inputs), axis=3)
         reference = given if self._referenced else denominator if s.estimator == "direct" else None
         excitation = given if stage.beside else None
         return estimate(Windows(output, denominator, reference, complete, excitation), s.average, s.condition_max)
 
-    def _windows(self, at: NDArray[np.intp], repetitions: int) -> Complex:
+    def _windows(self, rows: NDArray[np.intp], repetitions: int) -> Complex:
         """Spectra of rows, counted from the next place in the ring.
 
         Shape (rows, lines, repetitions, signals, experiments), the newest first.
         """
         s = self.settings
         back = s.places * np.arange(repetitions * s.count).reshape(repetitions, s.count)
-        past = self._past[(self._next + at[:, np.newaxis, np.newaxis] - back) % len(self._complete)]
+        past = self._past[(self._next + rows[:, np.newaxis, np.newaxis] - back) % len(self._complete)]
         return np.asarray((past[:, :, :, :, 0] + 1j * past[:, :, :, :, 1]).transpose(0, 4, 1, 3, 2))
 
-    def _through_loop(self, found: MatrixEstimate) -> MatrixEstimate:
+    def _through_loop(self, estimate: MatrixEstimate) -> MatrixEstimate:
         """G = T·(E − F·T)⁻¹, and dG = (1 + G·F)·dT·(E − F·T)⁻¹; invalid unless all columns of T are valid."""
         s = self.settings
-        worst = np.broadcast_to(found.reason.max(axis=2, keepdims=True), found.reason.shape).copy()
+        worst = np.broadcast_to(estimate.reason.max(axis=2, keepdims=True), estimate.reason.shape).copy()
         whole = worst[:, :, 0] == 0
         feedback = s.loop.feedback_at(s.lines.frequency_hz)
         entry = s.loop.entry_at(s.lines.frequency_hz, len(s.excitation))
         unit = np.eye(len(s.excitation))
-        inputs = np.where(whole[..., None, None], entry - feedback @ found.value, unit)
+        inputs = np.where(whole[..., None, None], entry - feedback @ estimate.value, unit)
         inverse = np.linalg.inv(inputs)
-        value = found.value @ inverse
+        value = estimate.value @ inverse
         closed = np.eye(len(s.output)) + value @ feedback
-        noise = closed @ found.noise @ np.swapaxes(closed, 2, 3).conj()
-        spread = np.swapaxes(inverse, 2, 3) @ found.spread @ inverse.conj()
-        return MatrixEstimate(value, noise, spread, found.dof, found.coherence, found.condition, worst)
+        noise = closed @ estimate.noise @ np.swapaxes(closed, 2, 3).conj()
+        spread = np.swapaxes(inverse, 2, 3) @ estimate.spread @ inverse.conj()
+        return MatrixEstimate(value, noise, spread, estimate.dof, estimate.coherence, estimate.condition, worst)

@@ -1,21 +1,65 @@
-"""Residuals of matrices in units of their noise: the full covariance of the entries at each line."""
+"""Residuals of matrices in units of their noise: the covariance of the entries at each line, and of all lines."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Floats
 from livebode.core import FitError, MatrixResponses
-from livebode.mimo import mean_matrix
-from livebode_matrix.row_scatter import row_scatter
+from livebode.fitting import mean_matrix
+
+ROWS_LEAST = 6
+_ROWS_MAX = 64
+_VALUES_EACH = 10  # values of a matrix for each row, at least: of fewer, vectors at right angles hide what is alike
+_RANK = 1e-3
+
+
+def row_scatter(responses: MatrixResponses, use: NDArray[np.bool_], inverse: Complex) -> Complex:
+    """Independent errors of unit power as the noise gives them, all lines together, shape (errors, lines, entries).
+
+    A window begins and ends with different states. What this adds to a spectrum (leakage) is a smooth function of
+    frequency, so that the errors of neighbouring lines beside a mode are alike. A covariance of each line does not show
+    that, but the matrices of a recording do: they are mixtures of the same independent windows. Their singular vectors
+    are such mixtures too, with equal power.
+
+    Parameters
+    ----------
+    responses
+        Rows of one recording; they may share windows. Those are used whose windows begin at the same place of a period
+        as the last one's, because leakage depends on that place, at most the newest 64.
+    use
+        The lines, shape (lines,).
+    inverse
+        By which errors of the entries become uncorrelated, shape (lines used, entries, entries).
+
+    Returns
+    -------
+    Complex
+        One less than rows; none if there are fewer than six.
+    """
+    none = np.empty((0, *inverse.shape[:2]), dtype=np.complex128)
+    whole = responses.valid[:, use].all(axis=(1, 2))
+    aligned = (responses.sample - responses.sample[-1]) % responses.lines.window == 0
+    rows = np.flatnonzero(whole & aligned)[-min(_ROWS_MAX, inverse[:, 0].size // _VALUES_EACH) :]
+    if rows.size < ROWS_LEAST:
+        return none
+    value = responses.value[rows][:, use].reshape(rows.size, *inverse.shape[:2])
+    apart = np.einsum("kij,rkj->rki", inverse, value - value.mean(axis=0)).reshape(rows.size, -1)
+    _, size, vectors = np.linalg.svd(apart, full_matrices=False)
+    kept = vectors[size > _RANK * size[0]]
+    if len(kept) < ROWS_LEAST - 1:
+        return none
+    return np.asarray((np.sqrt(apart.shape[1]) * kept).reshape(-1, *inverse.shape[:2]))
+
 
 _ROUNDING = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
-class Weighted:
+class WeightedMatrix:
     """The lines of a mean matrix where all columns are valid, and the covariance of its entries.
 
     Attributes
@@ -41,7 +85,7 @@ class Weighted:
     scattered: Complex
 
     @classmethod
-    def of(cls, responses: MatrixResponses, band_hz: tuple[float, float] | None) -> Weighted:
+    def of(cls, responses: MatrixResponses, band_hz: tuple[float, float] | None) -> WeightedMatrix:
         """From the mean of the rows that share no window, at the lines of a band where all columns are valid."""
         matrix = mean_matrix(responses)
         low, high = band_hz or (0.0, np.inf)
@@ -59,7 +103,7 @@ class Weighted:
         whole = use & matrix.valid[0].all(axis=1)
         if not whole.any():
             raise FitError("too-few-lines", "no line has all its columns valid", "see why() for the reasons", lines=0)
-        found = cls(
+        whitening = cls(
             matrix,
             matrix.frequency_hz[whole],
             matrix.value[0, whole].reshape(np.count_nonzero(whole), -1),
@@ -68,7 +112,7 @@ class Weighted:
             dof,
             np.empty((0, 0, 0), dtype=np.complex128),
         )
-        return replace(found, scattered=row_scatter(responses, whole, found.part(0.0)[0]))
+        return replace(whitening, scattered=row_scatter(responses, whole, whitening.part(0.0)[0]))
 
     @property
     def outputs(self) -> int:

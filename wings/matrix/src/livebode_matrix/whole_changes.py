@@ -15,8 +15,8 @@ def whole_changes(
     try:
         if gantry is None:
             return (f"all entries: {compare_matrices(before, after).sentence}",)
-        found = compare_gantries(before, after, gantry, cart_m=cart_m)
-        return tuple(f"gantry: {sentence}" for sentence in found.sentences)
+        change = compare_gantries(before, after, gantry, cart_m=cart_m)
+        return tuple(f"gantry: {sentence}" for sentence in change.sentences)
     except (FitError, GridError) as error:
         if gantry is not None:
             raise

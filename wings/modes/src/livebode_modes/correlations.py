@@ -52,6 +52,6 @@ def hankel(correlations: Floats, rows: int) -> Floats:
         Shape (…, rows·outputs, rows·outputs).
     """
     outputs = correlations.shape[-1]
-    at = 1 + np.add.outer(np.arange(rows), np.arange(rows))
-    blocks = np.moveaxis(correlations[..., at, :, :], -2, -3)  # (…, rows, outputs, rows, outputs)
+    lags = 1 + np.add.outer(np.arange(rows), np.arange(rows))
+    blocks = np.moveaxis(correlations[..., lags, :, :], -2, -3)  # (…, rows, outputs, rows, outputs)
     return np.asarray(blocks.reshape(*correlations.shape[:-3], rows * outputs, rows * outputs))

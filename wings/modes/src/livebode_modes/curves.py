@@ -59,10 +59,13 @@ def mode_curves(run: RunRecord, rows_max: int = ROWS_MAX) -> list[ModeCurve]:
         for model in dict.fromkeys(columns["model"]):
             of_model = parts.setdefault(model, {})
             for name in ("frequency", "damping"):
-                at = used & (columns["model"] == model) & (columns["name"] == name)
+                rows = used & (columns["model"] == model) & (columns["name"] == name)
                 for column in ("time_s", "value", "sigma"):
-                    of_model.setdefault(f"{name} {column}", []).append(columns[column][at])
-    return [_curve(model, {key: np.concatenate(part) for key, part in found.items()}) for model, found in parts.items()]
+                    of_model.setdefault(f"{name} {column}", []).append(columns[column][rows])
+    return [
+        _curve(model, {key: np.concatenate(part) for key, part in columns_of_mode.items()})
+        for model, columns_of_mode in parts.items()
+    ]
 
 
 _COLUMNS = ("sample", "time_s", "model", "name", "value", "sigma")

@@ -35,14 +35,14 @@ _NAMES: dict[Kind, tuple[str, ...]] = {"mode": ("frequency", "damping", "share")
 _UNITS = {"frequency": "Hz", "damping": "", "share": ""}
 
 
-def mac(one: NDArray[np.complex128], other: NDArray[np.complex128]) -> float:
+def mac(shape: NDArray[np.complex128], other: NDArray[np.complex128]) -> float:
     """Modal assurance criterion of two mode shapes: 1 if they are proportional (Allemang 2003).
 
     >>> round(mac(np.array([1, 1j]), np.array([2j, -2])), 6), mac(np.array([1, 0]), np.array([0, 1]))
     (1.0, 0.0)
     """
-    product = np.vdot(one, one).real * np.vdot(other, other).real
-    return float(np.abs(np.vdot(one, other)) ** 2 / product) if product else 0.0
+    product = np.vdot(shape, shape).real * np.vdot(other, other).real
+    return float(np.abs(np.vdot(shape, other)) ** 2 / product) if product else 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +58,7 @@ class _Track:
 
     last: Mode
     missed: int = 0
-    found: int = 0
+    windows: int = 0
     harmonic: int = 0
     number: int = 0
     kind: Kind = "mode"
@@ -78,7 +78,7 @@ class _Track:
             self.missed += 1
             return
         self.last, self.missed = row.mode, 0
-        self.found += 1
+        self.windows += 1
         self.harmonic += row.harmonic
 
     def rows(self) -> Parameters:
@@ -159,16 +159,16 @@ class Tracks:
                 self._tracks[-1].add(row)
 
     def _published(self, least: int) -> list[Parameters]:
-        found = []
+        rows = []
         for track in sorted(self._tracks, key=lambda track: track.last.frequency_hz):
-            if not track.waiting or (not track.number and track.found < least):
+            if not track.waiting or (not track.number and track.windows < least):
                 continue
             if not track.number:
-                track.kind = "harmonic" if 2 * track.harmonic > track.found else "mode"
+                track.kind = "harmonic" if 2 * track.harmonic > track.windows else "mode"
                 self._numbers[track.kind] += 1
                 track.number = self._numbers[track.kind]
-            found.append(track.rows())
-        return found
+            rows.append(track.rows())
+        return rows
 
 
 def _status(row: _Row, kind: Kind) -> str:
@@ -234,13 +234,13 @@ class ModeSummaries:
 
 
 def _values(rows: Parameters, i: int) -> dict[str, float]:
-    found = {"time_s": float(rows.time_s[i])}
+    values = {"time_s": float(rows.time_s[i])}
     for j, name in enumerate(rows.names):
         key = "frequency_hz" if name == "frequency" else name
-        found[key] = float(rows.value[i, j])
+        values[key] = float(rows.value[i, j])
         if np.isfinite(sigma := rows.sigma[i, j]):
-            found[f"{key}_sigma"] = float(sigma)
-    return found
+            values[f"{key}_sigma"] = float(sigma)
+    return values
 
 
 _NO_MODES = Message(
@@ -333,8 +333,8 @@ class OutputOnly(Estimate):
         return self._rows(self._tracks.finish())
 
     def describe(self, about: Mapping[str, Any], channels: Sequence[Channel]) -> dict[str, Any]:  # noqa: ARG002
-        found = self.settings.found() | about["found"]
-        return {"output_only": True} | dict(about) | {"found": found, "versions": versions()}
+        facts = self.settings.found() | about["found"]
+        return {"output_only": True} | dict(about) | {"found": facts, "versions": versions()}
 
     def summary(self, sample: int, time_s: float) -> tuple[dict[str, Any], list[Event]]:
         run_s, recorded_s = self.run.counts.run_s, self.counts["samples"] / self.rate_hz

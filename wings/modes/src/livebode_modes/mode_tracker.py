@@ -158,14 +158,16 @@ class ModeTracker:
                 )
             _report(emit, "gap", block, block.start, gap)
         if bad.size:
-            at = block.start + int(bad[0])
-            found = Message("1 sample not finite, from sample {at_sample}", at_sample=at)
+            first = block.start + int(bad[0])
+            words = Message("1 sample not finite, from sample {at_sample}", at_sample=first)
             if bad.size > 1:
-                found = Message("{samples} samples not finite, from sample {at_sample}", samples=bad.size, at_sample=at)
-            _report(emit, "non-finite", block, at, found)
+                words = Message(
+                    "{samples} samples not finite, from sample {at_sample}", samples=bad.size, at_sample=first
+                )
+            _report(emit, "non-finite", block, first, words)
 
     def _windows(self, block: Block) -> list[WindowModes]:
-        of, found = self.settings, list[WindowModes]()
+        of, results = self.settings, list[WindowModes]()
         length = of.hop_samples + of.lags
         while self._reduced.shape[1] >= length:
             y, whole = self._reduced[:, :length], bool(self._finite[:length].all())
@@ -174,8 +176,8 @@ class ModeTracker:
             self._reduced, self._finite = self._reduced[:, of.hop_samples :], self._finite[of.hop_samples :]
             self._hop_number += 1
             if len(self._hops) == of.hops:
-                found.append(self._window(block))
-        return found
+                results.append(self._window(block))
+        return results
 
     def _window(self, block: Block) -> WindowModes:
         of = self.settings
@@ -193,8 +195,8 @@ class ModeTracker:
         subspace = Subspace(correlations, of.rows, of.reduced_rate_hz)
         samples = np.array([y for _, y in whole])
         modes, harmonics = list[Mode](), list[Mode]()
-        order, found = stable_modes(subspace, of.band_hz)
-        for mode in found:
+        order, stable = stable_modes(subspace, of.band_hz)
+        for mode in stable:
             (harmonics if is_harmonic(mode, samples, of.reduced_rate_hz) else modes).append(mode)
         return WindowModes(newest, time_s, schedule, tuple(modes), tuple(harmonics), order=order)
 

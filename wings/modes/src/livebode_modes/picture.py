@@ -96,13 +96,13 @@ def _panels(upper: Axes, lower: Axes, look: Style, curves: Sequence[ModeCurve]) 
 
 def _line(axes: Axes, time_s: Floats, value: Floats, sigma: Floats, colour: str, *, dashed: bool = False) -> None:
     bound = _C * sigma
-    at, (middle, low, high) = with_holes(time_s, [x[:, np.newaxis] for x in (value, value - bound, value + bound)])
-    axes.fill_between(at, low[:, 0], high[:, 0], color=colour, alpha=0.22, linewidth=0, gid="bound")
-    axes.plot(at, middle[:, 0], color=colour, linewidth=1.3, linestyle="--" if dashed else "-", gid="value")
+    times, (middle, low, high) = with_holes(time_s, [x[:, np.newaxis] for x in (value, value - bound, value + bound)])
+    axes.fill_between(times, low[:, 0], high[:, 0], color=colour, alpha=0.22, linewidth=0, gid="bound")
+    axes.plot(times, middle[:, 0], color=colour, linewidth=1.3, linestyle="--" if dashed else "-", gid="value")
     known = np.isfinite(middle[:, 0])
     alone = known & ~(np.append(known[1:], False) | np.append(False, known[:-1]))
     axes.errorbar(
-        at[alone], middle[alone, 0], (high - middle)[alone, 0], color=colour, linestyle="", marker="o", markersize=4
+        times[alone], middle[alone, 0], (high - middle)[alone, 0], color=colour, linestyle="", marker="o", markersize=4
     )
 
 

@@ -76,8 +76,8 @@ class Reduction:
             self._last = y[:, -1]
             return y
         before = np.zeros((len(y), 1)) if self._last is None else self._last[:, np.newaxis]
-        at = np.maximum.accumulate(np.where(finite, np.arange(1, len(finite) + 1), 0))
-        held = np.asarray(np.concatenate([before, y], axis=1)[:, at])
+        last = np.maximum.accumulate(np.where(finite, np.arange(1, len(finite) + 1), 0))
+        held = np.asarray(np.concatenate([before, y], axis=1)[:, last])
         if finite.any():
             self._last = held[:, -1]
         return held

@@ -107,9 +107,16 @@ class Subspace:
         covariance = np.einsum("kpi,kpj->pij", both, both)
         shape = observability[: self._outputs] @ vectors[:, use]
         share = self._shares(order, shape, lefts, roots[use])
-        at = np.argsort(size)
+        order_of_size = np.argsort(size)
         damping = -s.real / size
-        return Poles(order, size[at] / (2 * np.pi), damping[at], covariance[at], share[at], shape.T[at])
+        return Poles(
+            order,
+            size[order_of_size] / (2 * np.pi),
+            damping[order_of_size],
+            covariance[order_of_size],
+            share[order_of_size],
+            shape.T[order_of_size],
+        )
 
     def _changes(self, order: int, inverse: Floats, transition: Floats, lefts: Complex, vectors: Complex) -> Complex:
         """Change of each root along each hop's deviation, (hops, poles)."""

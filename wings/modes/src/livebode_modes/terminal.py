@@ -78,9 +78,9 @@ def _limits(values: np.ndarray, share: float) -> tuple[float, float]:
 def _time_axis(across: Scale, begin: float, end: float, margin: int) -> list[str]:
     edge, numbers = ["─"] * across.cells, ""
     for tick in linear_ticks(begin, end, most=max(3, across.cells // 12)):
-        at, text = across.cell(tick), f"{tick:g}"
-        edge[at] = "┬"
-        first = min(max(at - (len(text) - 1) // 2, 0), across.cells - len(text))
+        cell, text = across.cell(tick), f"{tick:g}"
+        edge[cell] = "┬"
+        first = min(max(cell - (len(text) - 1) // 2, 0), across.cells - len(text))
         if first > len(numbers) or not numbers:
             numbers = numbers.ljust(first) + text
     return [" " * margin + f"└{''.join(edge)}┘", " " * (margin + 1) + numbers]
@@ -101,10 +101,10 @@ def draw_modes(estimate: OutputOnly, into: Path) -> None:
 
 
 def _facts(summary: dict[str, Any]) -> str:
-    found = summary["found"]
+    facts = summary["found"]
     return (
-        f"from the output alone: {', '.join(found['outputs'])} · {counted(len(summary['modes']), 'mode')}, "
-        f"{counted(len(summary['harmonics']), 'harmonic')} · window {found['window'] / found['rate_hz']:.4g} s · "
+        f"from the output alone: {', '.join(facts['outputs'])} · {counted(len(summary['modes']), 'mode')}, "
+        f"{counted(len(summary['harmonics']), 'harmonic')} · window {facts['window'] / facts['rate_hz']:.4g} s · "
         "95 % bounds"
     )
 
@@ -131,14 +131,14 @@ def show_modes(outcome: Outcome) -> None:
 
 def mode_lines(summary: dict[str, Any]) -> list[str]:
     """The result of an output-only run in sentences."""
-    counts, found, speed = summary["counts"], summary["found"], summary["speed"]
-    low_hz, high_hz = found["band_hz"]
-    lines = [_mode(track) for track in summary["modes"]] or [_no_mode(found["window"] / found["rate_hz"])]
+    counts, facts, speed = summary["counts"], summary["found"], summary["speed"]
+    low_hz, high_hz = facts["band_hz"]
+    lines = [_mode(track) for track in summary["modes"]] or [_no_mode(facts["window"] / facts["rate_hz"])]
     lines += [_harmonic(track) for track in summary["harmonics"]]
     gaps = f", {counted(counts['gaps'], 'gap')}" if counts["gaps"] else ""
     lines.append(
-        f"{counted(counts['windows'], 'window')} of {found['window'] / found['rate_hz']:.4g} s, one every "
-        f"{found['hop'] / found['rate_hz']:.4g} s, {low_hz:.4g} … {high_hz:.4g} Hz, from {counts['samples']} samples"
+        f"{counted(counts['windows'], 'window')} of {facts['window'] / facts['rate_hz']:.4g} s, one every "
+        f"{facts['hop'] / facts['rate_hz']:.4g} s, {low_hz:.4g} … {high_hz:.4g} Hz, from {counts['samples']} samples"
         f"{gaps}: {speed['recorded_s']:.1f} s of output in {speed['run_s']:.2f} s"
     )
     return lines

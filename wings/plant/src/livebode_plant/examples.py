@@ -86,7 +86,7 @@ def write_hall(path: Path) -> None:
     lake = Lake(str(path))
     rows = [row for number, axis in enumerate(_AXES) for row in _results(axis, number)]
     for name, part in (("quantities", 0), ("runs", 1)):
-        own = [one for row in rows for one in (row[part] if part == 0 else [row[part]])]
+        own = [result for row in rows for result in (row[part] if part == 0 else [row[part]])]
         for begin in range(0, len(own), _GROUP * 4):
             lake.add_rows(name, pa.Table.from_pylist(own[begin : begin + _GROUP * 4], TABLES[name].schema))
     lake.add_rows("quarantine", pa.Table.from_pylist([_bad("A/L2/M3/x")], TABLES["quarantine"].schema))

@@ -1,28 +1,68 @@
-"""SettingsSection: what the tables of archive.toml and of fleet.toml have in common."""
+"""SettingsFile and SettingsSection: archive.toml and fleet.toml, and their tables, read in one way."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Self, get_args
+from typing import Any, Self, get_args
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from livebode.configuration import one_line, shortened
+from livebode.configuration import one_line, read_table, shortened
 from livebode.core import ConfigError, nearest_name
 
 
 class SettingsSection(BaseModel):
-    """A table of a TOML file, or the whole of it."""
+    """A table of a TOML file."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
 
-    def with_files(self, folder: Path, *names: str) -> Self:
-        """The section with the files of these keys relative to a folder."""
-        files = {name: getattr(self, name) for name in names}
-        return self.model_copy(update={name: folder / path for name, path in files.items() if path is not None})
+    def beside(self, folder: Path) -> Self:
+        """The section with its paths, and those of its sections, relative to a folder."""
+        return self.model_copy(update={name: _beside(folder, value) for name, value in self})
 
 
-def first_error(error: ValidationError, settings: type[SettingsSection]) -> ConfigError:
+class SettingsFile(SettingsSection):
+    """The whole of a TOML file."""
+
+    @classmethod
+    def read(cls, path: Path) -> Self:
+        """The settings of a file, with paths from its folder.
+
+        Raises
+        ------
+        ConfigError
+            If it cannot be read, or a key or value is invalid; the message gives both.
+        """
+        return cls.of(read_table(path), str(path)).beside(path.parent)
+
+    @classmethod
+    def of(cls, data: dict[str, Any], origin: str) -> Self:
+        """The settings in plain data; `origin` names it in messages."""
+        try:
+            settings = cls.model_validate(data)
+            settings.check()
+        except ValidationError as error:
+            raise _first_error(error, cls).at(origin) from None
+        except ConfigError as error:
+            raise error.at(origin) from None
+        return settings
+
+    def check(self) -> None:
+        """ConfigError if values are valid each by itself, and not together."""
+
+
+def place_beside(folder: Path, place: str) -> str:
+    """A path relative to a folder; a URL as it is."""
+    return place if "://" in place else str(folder / place)
+
+
+def _beside(folder: Path, value: Any) -> Any:
+    if isinstance(value, SettingsSection):
+        return value.beside(folder)
+    return folder / value if isinstance(value, Path) else value
+
+
+def _first_error(error: ValidationError, settings: type[SettingsSection]) -> ConfigError:
     """The first error, with its key and value; missing keys last, because a misspelt key also causes a missing one."""
     first = min(error.errors(include_url=False), key=lambda one: one["type"] == "missing")
     place = one_line(".".join(str(part) for part in first["loc"]))
@@ -47,6 +87,6 @@ def _section(settings: type[SettingsSection], names: list[str]) -> type[Settings
     for name in names:
         kind = settings.model_fields[name].annotation
         settings = next(
-            one for one in (kind, *get_args(kind)) if isinstance(one, type) and issubclass(one, SettingsSection)
+            part for part in (kind, *get_args(kind)) if isinstance(part, type) and issubclass(part, SettingsSection)
         )
     return settings

@@ -10,9 +10,8 @@ import pytest
 
 from livebode_plant.archive.alone import handle_alone
 from livebode_plant.archive.archive_settings import ArchiveSettings
-from livebode_plant.archive.job import Job
-from livebode_plant.archive.recording_places import find_places, untracked
-from livebode_plant.archive.results import TrackedResult, TrackingFailure
+from livebode_plant.archive.archived_recordings import TrackedResult, TrackingFailure, find_places, untracked
+from livebode_plant.archive.tasks import Job
 from tests.support.archives import contents_of, write_archive
 
 

@@ -15,8 +15,8 @@ from distributed import LocalCluster, Security
 from livebode import ArchiveError
 from livebode_plant.archive import clusters, distribution
 from livebode_plant.archive.archive_settings import ClusterSection
-from livebode_plant.archive.groups import RecordingGroups
-from livebode_plant.archive.recording_places import ArchivedRecording, RecordingPlace
+from livebode_plant.archive.archived_recordings import ArchivedRecording, RecordingPlace
+from livebode_plant.archive.distribution import RecordingGroups
 from tests.support.certificates import certified
 
 

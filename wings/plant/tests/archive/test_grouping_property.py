@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from livebode_plant.archive.groups import RecordingGroups
+from livebode_plant.archive.distribution import RecordingGroups
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,7 @@ from livebode import ArchiveError
 from livebode.monitoring import Baseline
 from livebode.runtime import Destination, run
 from livebode_plant.archive.archive_settings import ArchiveSettings
-from livebode_plant.archive.healthy_runs import healthy_runs
-from livebode_plant.archive.learning import learn_of_lake
+from livebode_plant.archive.learning import healthy_runs, learn_of_lake
 from livebode_plant.lake import Lake, compact, runs_of
 from livebode_plant.trending import Selection
 from livebode_plant.trending.machine_year import START_S, MachineYear
@@ -152,6 +151,7 @@ def test_each_machine_is_judged_by_its_own_baseline_and_alarms_are_not_learned(t
         (("--machine", "press-3"), "the lake has no run of press-3"),
         (("--machine", "press-1", "--exclude", "z.parquet"), "the lake has no recording 'z.parquet'"),
         (("--machine", "press-1", "--since", "2999-01-01"), "the lake has no run of press-1"),
+        (("--machine", "press-1", "--until", "1999-01-01"), "the lake has no run of press-1"),
         (("--machine", "press-1", "--out", "s3://a/b.json"), "is not a path on this computer"),
     ],
 )

@@ -45,6 +45,21 @@ def lake(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "lake"
 
 
+def test_what_is_in_quarantine_is_tracked_again_on_request(tmp_path: Path) -> None:
+    (tmp_path / "press").mkdir()
+    (tmp_path / "press" / "log.csv").write_text("t,u,y\n0,1,1\n0.001,1,1\n")
+    (tmp_path / "recipe.toml").write_text(RECIPE)
+    with cluster_here() as address:
+        (tmp_path / "archive.toml").write_text(
+            f'inputs = ["{{machine}}/*.csv"]\nrecipe = "recipe.toml"\nlake = "lake"\n[cluster]\naddress = "{address}"\n'
+        )
+        tried = [
+            json.loads(livebode("archive", "run", tmp_path / "archive.toml", *options, "--json").out)
+            for options in ((), (), ("--retry", "older"), ("--retry", "all"))
+        ]
+    assert [len(one["quarantined"]) for one in tried] == [1, 0, 0, 1]
+
+
 def test_a_run_without_responses_gives_no_baseline_and_one_sentence_says_why(lake: Path, tmp_path: Path) -> None:
     learned = livebode("archive", "learn", lake, "--each", "--out", tmp_path / "{machine}.json", "--json")
     refused = {one["machine"]: one for one in json.loads(learned.out)["refused"]}

@@ -10,9 +10,8 @@ from hypothesis import settings as run_with
 from hypothesis import strategies as st
 
 from livebode import ConfigError
-from livebode_plant.archive.archive_settings import ArchiveSettings
-from livebode_plant.archive.recording_places import RecordingPlace, find_places, levels_of
-from livebode_plant.archive.template import Template
+from livebode_plant.archive.archive_settings import ArchiveSettings, Template
+from livebode_plant.archive.archived_recordings import RecordingPlace, find_places, levels_of
 
 TLS = 'certificate = "a.pem"\nkey = "a.key"\nauthority = "ca.pem"\n'
 NAMES = st.text(st.characters(blacklist_characters="/", blacklist_categories=("Cs", "Cc")), min_size=1, max_size=8)

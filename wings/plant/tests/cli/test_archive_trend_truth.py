@@ -1,10 +1,11 @@
-"""`livebode archive trend` and `archive report` on the lake of a simulated hall, whose faults are known."""
+"""`livebode archive trend` and `archive compare` on the lake of a simulated hall, whose faults are known."""
 
 from __future__ import annotations
 
 import csv
 import json
 from pathlib import Path
+from typing import Any
 
 import matplotlib.image
 import pytest
@@ -49,12 +50,36 @@ def test_the_table_names_what_was_found_and_what_was_not_assessed(hall: Path) ->
     assert "A/L2/M1: no run since 2025-08-12" in lines
 
 
+def test_runs_are_selected_by_date_and_recipe_and_judged_by_the_limit(hall: Path) -> None:
+    def trend(*options: object) -> Any:
+        return json.loads(livebode("archive", "trend", hall, "Keff", *options, "--json").out)
+
+    whole, half = trend("--recipe", "e1d8"), trend("--until", "2025-06-30")
+    assert whole == trend()
+    assert max(one["to"] for one in half["machines"]) <= "2025-06-30"
+    assert half["runs"] < whole["runs"]
+    refused = livebode("archive", "trend", hall, "Keff", "--recipe", "ffff")
+    assert (refused.code, "Recipes: e1d8" in refused.err) == (2, True)
+    near, far = (trend("--limit", percent)["machines"][0]["months_to_limit"] for percent in (10, 20))
+    assert near < far
+    assert livebode("archive", "compare", hall, "A/L1/M2/x", "--split", "2025-06-15", "--until", "2025-06-15").code == 2
+
+
+def test_the_quarantine_and_the_rows_of_a_query_are_listed(hall: Path) -> None:
+    bad = json.loads(livebode("archive", "list", hall, "--quarantined", "--json").out)["quarantine"]
+    assert [(one["machine"], one["code"]) for one in bad] == [("M3", "recording.damaged")]
+    shown = livebode("archive", "list", hall, "--sql", "SELECT axis FROM runs", "--rows", 3, "--csv")
+    assert shown.out == "axis\nx\nx\nx\n"
+    assert "only the first 3 rows" in shown.err
+
+
 def test_a_picture_and_a_table_are_written_once(hall: Path, tmp_path: Path) -> None:
     picture, table = tmp_path / "year.png", tmp_path / "trend.csv"
     for out in (picture, table):
         assert livebode("archive", "trend", hall, "Keff", "--machine", "A/L1", "--out", out).code == 0
         refused = livebode("archive", "trend", hall, "Keff", "--out", out)
         assert (refused.code, "exists already" in refused.err) == (2, True)
+    assert livebode("archive", "trend", hall, "Keff", "--machine", "A/L1", "--out", table, "--force").code == 0
     assert matplotlib.image.imread(picture).shape[:2] == (599, 990)
     rows = list(csv.DictReader(table.read_text("utf-8").splitlines()))
     assert [row["machine"] for row in rows] == ["A/L1/M3", "A/L1/M4", "A/L1/M2", "A/L1/M1"]
@@ -69,12 +94,29 @@ def test_a_picture_and_a_table_are_written_once(hall: Path, tmp_path: Path) -> N
         (["Keff", "--out", "year.jpg"], "neither a .png nor a .csv"),
         (["Keff", "--machine", "B", "--out", "year.png"], "no machine has a trend to draw"),
         (["Keff", "--covariate", "temp"], "did you mean 'temperature'?"),
+        (["--by", "axis"], "--by is for one quantity; name a QUANTITY, or omit it"),
+        (["--dark"], "--dark is for one quantity"),
+        (["Keff", "--name", "Hall 1"], "--name is for the page of all quantities; leave out the QUANTITY, or omit it"),
+        (["Keff", "--language", "de"], "--language is for the page of all quantities"),
     ],
 )
 def test_a_wrong_word_is_one_sentence_with_what_to_do(hall: Path, words: list[str], said: str) -> None:
     refused = livebode("archive", "trend", hall, *words)
     assert (refused.code, refused.err.count("\n")) == (2, 1)
     assert said in refused.err
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["list", "HALL", "--sql", "SELECT 1", "--quarantined"], "--quarantined and --sql exclude each other"),
+        (["list", "HALL", "--rows", "3"], "--rows belongs to --sql"),
+        (["run", "HALL", "--retry", "all", "--compact"], "--retry and --compact exclude each other"),
+    ],
+)
+def test_an_option_of_the_other_use_is_refused(hall: Path, words: list[str], says: str) -> None:
+    refused = livebode("archive", *(hall if word == "HALL" else word for word in words))
+    assert (refused.code, says in refused.err) == (2, True), refused
 
 
 @pytest.mark.parametrize(

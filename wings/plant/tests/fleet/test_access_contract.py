@@ -16,15 +16,15 @@ from nats.errors import Error, NoRespondersError
 from nats.js.errors import NoStreamResponseError, ServiceUnavailableError
 
 from livebode.core import ConfigError, FleetError
-from livebode_plant.fleet.credentials import write_credentials
+from livebode_plant.fleet.connection import write_credentials
 from livebode_plant.fleet.fleet_settings import FleetSettings, LogSection
 from livebode_plant.fleet.log import FleetLog
 from livebode_plant.fleet.message import message_id, write_message
-from livebode_plant.fleet.page_status import VIEW
 from livebode_plant.fleet.server import LogServer
 from livebode_plant.fleet.status import fleet_status
+from livebode_plant.fleet.status_message import VIEW
 from livebode_plant.fleet.subjects import ACTS, EDGE, LOG, LOG_STREAM, RESULTS, STATUS, STATUS_STREAM, axis_path
-from livebode_plant.page.fleet_alarms import FleetAct
+from livebode_plant.page.fleet_board import FleetAct
 from livebode_plant.page.fleet_feed import NatsFeed
 from tests.support.command import livebode
 from tests.support.fleet_runs import PARTITIONS, batch

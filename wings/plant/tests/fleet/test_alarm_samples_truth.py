@@ -10,7 +10,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from livebode_plant.fleet import alarm_samples
+from livebode_plant.fleet import sink
 from livebode_plant.fleet.server import LogServer
 from livebode_plant.lake import Lake
 from tests.support.command import livebode
@@ -36,7 +36,7 @@ def server(tmp_path: Path) -> Iterator[LogServer]:
 def test_samples_around_an_alarm_are_saved_with_exact_numbers(
     server: LogServer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(alarm_samples, "_LATE_S", -2 * alarm_samples.AROUND_S)  # all of them are in the log already
+    monkeypatch.setattr(sink, "_LATE_S", -2 * sink.AROUND_S)  # all of them are in the log already
     log, axes, lake = log_section(server.url), fleet_axes(2), tmp_path / "lake"
     key = next(iter(axes))
     signals = axes[key].signals.model_copy(update={"outputs": "missing"})

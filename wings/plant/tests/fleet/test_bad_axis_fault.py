@@ -13,7 +13,8 @@ import pytest
 from livebode.core import FleetError
 from livebode.fitting import Fitter, problem, rows
 from livebode.runtime import Fits
-from livebode_plant.fleet.axis_stream import AxisStream, Output, outputs_together
+from livebode_plant.fleet.alike_axes import Output, outputs_together
+from livebode_plant.fleet.axis_stream import AxisStream
 from livebode_plant.fleet.fleet_settings import LogSection
 from livebode_plant.fleet.log import FleetLog
 from livebode_plant.fleet.reader import stored_messages

@@ -11,7 +11,7 @@ import pytest
 from livebode.core import FleetError
 from livebode_plant.fleet.fleet_settings import FleetSettings
 from livebode_plant.fleet.log import ClaimLostError, FleetLog
-from livebode_plant.fleet.server_cluster import cluster_member
+from livebode_plant.fleet.server_config import cluster_member
 from livebode_plant.fleet.subjects import LOG_STREAM, RESULT_STREAM, RESULTS
 from tests.support.command import livebode
 from tests.support.fleet_runs import PARTITIONS, checked, fleet_axes, owned_until_current, sent

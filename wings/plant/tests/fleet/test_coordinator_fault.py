@@ -15,7 +15,7 @@ import psutil
 import pytest
 
 from livebode.configuration import Axis
-from livebode_plant.fleet import worker_process
+from livebode_plant.fleet import coordinator as coordinator_module
 from livebode_plant.fleet.coordinator import FleetCoordinator
 from livebode_plant.fleet.fleet_settings import FleetSettings, LogSection
 from livebode_plant.fleet.server import LogServer
@@ -99,7 +99,7 @@ def test_workers_continue_without_their_coordinator_and_end_when_those_of_the_ne
 
 
 def test_a_worker_without_a_coordinator_for_too_long_ends(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(worker_process, "ORPHAN_S", 0.0)
+    monkeypatch.setattr(coordinator_module, "ORPHAN_S", 0.0)
     stop = threading.Event()
-    worker_process._show_life(RawValue("d"), stop)  # this process has no parent that started it
+    coordinator_module._show_life(RawValue("d"), stop)  # this process has no parent that started it
     assert stop.is_set()

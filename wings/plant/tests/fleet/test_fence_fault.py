@@ -15,10 +15,10 @@ from pathlib import Path
 import pytest
 
 from livebode.configuration import Axis
-from livebode_plant.fleet.check import CheckResult
 from livebode_plant.fleet.fleet_settings import LogSection
 from livebode_plant.fleet.log import FleetLog
 from livebode_plant.fleet.partition import PartitionOwner
+from livebode_plant.fleet.replay import CheckResult
 from livebode_plant.fleet.server import LogServer
 from livebode_plant.fleet.subjects import RESULT_STREAM
 from livebode_plant.fleet.worker import own_partitions

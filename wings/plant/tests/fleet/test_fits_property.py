@@ -11,10 +11,19 @@ from hypothesis import strategies as st
 
 from livebode.configuration import Axis
 from livebode.core import Responses
-from livebode_plant.fleet.axis_stream import AxisStream, Output, outputs_together
-from livebode_plant.fleet.page_status import KINDS, PageStatus
+from livebode_plant.fleet.alike_axes import Output, outputs_together
+from livebode_plant.fleet.axis_stream import AxisStream
 from livebode_plant.fleet.result_message import PendingResults, ResultMessage
-from livebode_plant.fleet.status_message import ACTIVE, PRIORITIES, STATES, PartitionNames, PartitionStatus, decode
+from livebode_plant.fleet.status_message import (
+    ACTIVE,
+    KINDS,
+    PRIORITIES,
+    STATES,
+    PageStatus,
+    PartitionNames,
+    PartitionStatus,
+    decode,
+)
 from livebode_plant.lake.wide_responses import from_wide
 from tests.support.fitted_fleet import fitted_axes, fitted_message, healthy_baseline
 

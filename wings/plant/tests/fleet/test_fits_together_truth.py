@@ -8,7 +8,7 @@ from livebode.configuration import FitSection
 from livebode.core import PID, Loop, PlantKinds
 from livebode.fitting import EvaluationGrid, TwoMass
 from livebode.runtime import Fits
-from livebode_plant.fleet.fits_together import process_together
+from livebode_plant.fleet.alike_axes import process_together
 from tests.support.fitted import LINES, TRUTH, noisy
 
 BELT = TwoMass(radius_m=0.019)

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from livebode.sources.live import encode_layout
 from livebode.sources.live.frame import layout_text
 from livebode.sources.live.framing import SAMPLES, framed
-from livebode_plant.fleet.axis_stream import AxisStream, Output
+from livebode_plant.fleet.alike_axes import Output
+from livebode_plant.fleet.axis_stream import AxisStream
 from livebode_plant.fleet.message import write_message
 from livebode_plant.fleet.result_message import PendingResults, ResultMessage
 from livebode_plant.fleet.server_config import PAYLOAD_BYTES_MAX

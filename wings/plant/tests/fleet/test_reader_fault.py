@@ -8,9 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from livebode_plant.fleet.consumer import MESSAGES_MAX, Delivery
-from livebode_plant.fleet.log import FleetLog, StoredMessage
-from livebode_plant.fleet.reader import Reader
+from livebode_plant.fleet.log import FleetLog
+from livebode_plant.fleet.reader import MESSAGES_MAX, Delivery, Reader, StoredMessage
 from livebode_plant.fleet.server import LogServer
 from livebode_plant.fleet.subjects import EDGE, LOG, LOG_STREAM
 from tests.support.fleet_runs import log_section

@@ -20,8 +20,8 @@ import pytest
 from livebode.core import LEVELS
 from livebode_plant.fleet import sink_tables
 from livebode_plant.fleet.fleet_settings import LogSection, SinkSection
-from livebode_plant.fleet.log import FleetLog, StoredMessage
-from livebode_plant.fleet.reader import stored_messages
+from livebode_plant.fleet.log import FleetLog
+from livebode_plant.fleet.reader import StoredMessage, stored_messages
 from livebode_plant.fleet.result_message import ResultMessage
 from livebode_plant.fleet.server import LogServer
 from livebode_plant.fleet.sink import Sink

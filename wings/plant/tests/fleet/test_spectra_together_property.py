@@ -15,7 +15,8 @@ from hypothesis import strategies as st
 from livebode.configuration import Axis
 from livebode.core import PER_LINE, PER_RESPONSE, Channel, Responses, SpectraLayout
 from livebode.sources.live import SpectraBatch
-from livebode_plant.fleet.axis_stream import AxisStream, Output, outputs_together, stacked_together
+from livebode_plant.fleet.alike_axes import Output, outputs_together, stacked_together
+from livebode_plant.fleet.axis_stream import AxisStream
 from livebode_plant.fleet.fleet_settings import LogSection
 from livebode_plant.fleet.log import FleetLog
 from livebode_plant.fleet.message import message_id, write_message
@@ -177,14 +178,14 @@ def test_axes_that_are_alike_are_one_stack_and_their_rows_are_stored_as_those_of
     _next(numbers, streams)
     _next(numbers, alone)
     stacks, outputs = stacked_together(streams)
-    assert [stack.at for stack in stacks] == [[0, 1], [2], [3, 4]]
+    assert [stack.indices for stack in stacks] == [[0, 1], [2], [3, 4]]
     assert list(outputs) == [5]  # it is fitted
     tables = []
     for found, rows, others in [(streams, stacks, outputs), (alone, [], dict(enumerate(outputs_together(alone))))]:
         pending = PendingResults()
         for stack in rows:
-            keys = [f"axis {numbers[i]}" for i in stack.at]
-            pending.add_rows(keys, [found[i] for i in stack.at], stack)
+            keys = [f"axis {numbers[i]}" for i in stack.indices]
+            pending.add_rows(keys, [found[i] for i in stack.indices], stack)
         for i, output in others.items():
             pending.add(f"axis {numbers[i]}", found[i], output)
         message = pending.message(1, "owner")
@@ -199,7 +200,7 @@ def test_an_unusual_spectrum_leaves_the_stack_alone(kind: str) -> None:
     streams = _streams([0, 1])
     _next([0, 1], streams, kinds={1: kind})
     (stack,), outputs = stacked_together(streams)
-    assert stack.at == [0]
+    assert stack.indices == [0]
     assert [event.kind for event in outputs[1].events] == [{"not finite": "not-whole"}.get(kind, kind)]
 
 
@@ -229,7 +230,7 @@ def test_axes_with_several_spectra_are_stacked_one_spectrum_after_the_other() ->
         _next([0, 1, 2], streams, n)
     _next([0], streams, 15)
     stacks, outputs = stacked_together(streams)
-    assert [stack.at for stack in stacks] == [[0, 1], [0, 1], [0, 1], [0]]
+    assert [stack.indices for stack in stacks] == [[0, 1], [0, 1], [0, 1], [0]]
     assert [stack.numbers[0] for stack in stacks] == [12, 13, 14, 15]
     assert list(outputs) == [2]
     assert outputs[2].responses is not None

@@ -24,7 +24,7 @@ class _Owner:
     def step(self) -> None:
         self.now_s += STEP_S
         for key in self.keys:
-            self.states.took(key, BLOCK_BYTES, self.computed_s)
+            self.states.processed(key, BLOCK_BYTES, self.computed_s)
         for key in self.states.due():
             self.states.stored(key, self.state_bytes)
             self.stored_s[key].append(self.now_s)

@@ -11,7 +11,7 @@ import pytest
 
 from livebode import ArchiveError
 from livebode_plant.lake import TABLES, Key, Lake, compact
-from livebode_plant.lake.data_file import write_data_file
+from tests.support.damaged_lake import write_data_file
 
 
 def rows(name: str, *keys: Key) -> pa.Table:
@@ -70,7 +70,7 @@ def test_a_file_of_a_result_that_counts_is_not_added(lake: Lake, tmp_path: Path)
 def test_quantities_of_a_result_without_its_run_do_not_count(lake: Lake) -> None:
     lake.add_rows("quantities", rows("quantities", *KEYS))
     lake.add_rows("runs", rows("runs", KEYS[2]))
-    assert lake.quantities()["content"].to_pylist() == [KEYS[2].content]
+    assert lake.counted("quantities")["content"].to_pylist() == [KEYS[2].content]
 
 
 def test_a_damaged_table_is_an_error_that_names_it(lake: Lake) -> None:

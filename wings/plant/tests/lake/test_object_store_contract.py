@@ -12,11 +12,9 @@ import pytest
 
 from livebode.locations import Url, find, write_whole
 from livebode_plant.archive.archive_settings import ArchiveSettings
+from livebode_plant.archive.archived_recordings import HashedContent, TrackedResult, each_result, find_places, untracked
 from livebode_plant.archive.coordinator import Committer
-from livebode_plant.archive.job import Job
-from livebode_plant.archive.recording_places import find_places, untracked
-from livebode_plant.archive.results import HashedContent, TrackedResult, each_result
-from livebode_plant.archive.tasks import handle
+from livebode_plant.archive.tasks import Job, handle
 from livebode_plant.lake import DataFile, Lake
 from livebode_plant.lake.table_directory import delta_options
 from tests.support.archives import contents_of, write_archive

@@ -13,7 +13,7 @@ import pyarrow.compute as pc
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from livebode_plant.lake import FLEET_EVENTS, Lake, StreamTable
+from livebode_plant.lake import TABLES, Lake, StreamTable
 from tests.support.object_storage import BUCKET, object_storage
 
 FIRST = dt.datetime(2026, 11, 20, tzinfo=dt.UTC)
@@ -26,7 +26,7 @@ def rows(first: int, last: int, hours: float = 1.0) -> pa.Table:
     for number in range(first, last + 1):
         logged = FIRST + dt.timedelta(hours=hours * number)
         found.append({"day": logged.date(), "axis": f"x{number % 3}", "logged": logged, "sample": number})
-    return pa.Table.from_pylist(found, FLEET_EVENTS)
+    return pa.Table.from_pylist(found, TABLES["fleet_events"].schema)
 
 
 def until(last: int) -> Callable[[int], pa.Table]:

@@ -22,9 +22,8 @@ from livebode_plant.fleet.status_message import (
     encode_names,
     encode_status,
 )
-from livebode_plant.page.fleet_alarms import CONDITIONS, FleetAct, FleetAlarms
-from livebode_plant.page.fleet_board import LOOKS, LOST_S, FleetBoard
-from livebode_plant.page.fleet_demo import DemoFeed, DemoFleet
+from livebode_plant.page.fleet_board import CONDITIONS, LOOKS, LOST_S, FleetAct, FleetAlarms, FleetBoard
+from livebode_plant.page.fleet_feed import DemoFeed, DemoFleet
 from livebode_plant.page.fleet_pages import tiles_frame
 from tests.support.fleet_pages import expected_looks
 

@@ -31,7 +31,7 @@ from livebode_plant.fleet.status_message import (
 from livebode_plant.fleet.worker import own_partitions
 from livebode_plant.page.fleet_board import LOOKS
 from livebode_plant.page.fleet_feed import NatsFeed
-from livebode_plant.page.fleet_view import FleetView
+from livebode_plant.page.fleet_pages import FleetView
 from tests.support.fleet_runs import PARTITIONS, SAMPLES, fleet_axes, log_section, send, sent
 
 

@@ -17,13 +17,12 @@ import pytest
 from playwright.sync_api import Browser
 
 from livebode.core import LEVELS, DamageWarning
-from livebode.dashboard import Dashboard, Serving
+from livebode.dashboard import Dashboard, ServerSettings
 from livebode_plant.fleet.status_message import encode_names
 from livebode_plant.lake import TABLES, Lake
-from livebode_plant.page.fleet_demo import DemoFeed, DemoFleet
-from livebode_plant.page.fleet_pages import FleetSite
+from livebode_plant.page.fleet_feed import DemoFeed, DemoFleet
+from livebode_plant.page.fleet_pages import FleetView
 from livebode_plant.page.fleet_trend import POINTS_MAX
-from livebode_plant.page.fleet_view import FleetView
 from tests.support.axe import violations, with_axe
 from tests.support.browser import Tab
 from tests.support.fleet_pages import fleet_page
@@ -65,8 +64,8 @@ class Page:
     def __init__(self, lake: str) -> None:
         view = FleetView(DemoFeed(FLEET), lake=lake)
         view.board.process([encode_names(names, time.time())[0] for names in FLEET.names()], time.time())
-        self.dashboard = Dashboard(Serving("127.0.0.1", 0, token=TOKEN, viewer_token=VIEWER))
-        self.dashboard.show(FleetSite(view))
+        self.dashboard = Dashboard(ServerSettings("127.0.0.1", 0, token=TOKEN, viewer_token=VIEWER))
+        self.dashboard.show(view)
 
     def trend(self, axis: str, quantity: str = "", token: str = VIEWER) -> tuple[int, Any]:
         """Status and answer."""

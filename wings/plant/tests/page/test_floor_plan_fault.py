@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import urllib.error
+import urllib.request
 from pathlib import Path
 
 import pytest
 
 from livebode.core import ConfigError
 from livebode_plant.page.floor_plan import floor_plan, sanitised
+from tests.support.served import served
 
 SVG = '<svg xmlns="http://www.w3.org/2000/svg" {0}>{1}</svg>'
 
@@ -73,3 +76,18 @@ def test_the_message_names_the_file(tmp_path: Path) -> None:
         file.write_bytes(content)
         with pytest.raises(ConfigError, match=why):
             floor_plan(file)
+
+
+def test_the_page_of_a_fleet_has_the_drawing_of_the_command_line(tmp_path: Path) -> None:
+    """As all of the page, to somebody with the token of --axis only."""
+    (tmp_path / "hall.svg").write_text(plan('<rect id="Augsburg/body/gantry 1" width="3" height="4"/>'))
+    (tmp_path / "token").touch(0o600)
+    (tmp_path / "token").write_text("x" * 32)
+    (tmp_path / "serve.toml").write_text('[serve]\ntoken_file = "token"\n')
+    asked = ("fleet", "status", "--demo", 6, "--plan", tmp_path / "hall.svg", "--axis", tmp_path / "serve.toml")
+    with served(tmp_path, *asked, "--trends", "https://plant/trends", "--port", 0) as (_, url):
+        known = {"Authorization": f"Bearer {'x' * 32}"}
+        drawing = urllib.request.urlopen(urllib.request.Request(f"{url}api/plan", headers=known)).read()
+        assert b'id="Augsburg/body/gantry 1"' in drawing
+        with pytest.raises(urllib.error.HTTPError, match="401"):
+            urllib.request.urlopen(f"{url}api/plan")

@@ -57,7 +57,7 @@ class MeasuredValues:
 
 
 @dataclass(frozen=True)
-class Accepted:
+class LimitResult:
     """A limit and its result.
 
     Attributes
@@ -88,13 +88,13 @@ class Accepted:
 
     def plain(self) -> dict[str, Any]:
         """For JSON."""
-        found = {
+        values = {
             "quantity": self.limit.quantity, "min": self.limit.min, "max": self.limit.max,
             "band_hz": self.limit.band_hz,
             "result": self.result, "value": self.value, "bound_95": self.bound, "unit": self.unit, "at_hz": self.at_hz,
             "times_the_data": self.times, "reason": self.reason,
         }  # fmt: skip
-        return {name: None if isinstance(x, float) and not isfinite(x) else x for name, x in found.items()}
+        return {name: None if isinstance(x, float) and not isfinite(x) else x for name, x in values.items()}
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,47 +118,47 @@ class LimitEvidence:
     tracks: Sequence[Track] = ()
 
 
-def accepted(limits: Sequence[LimitSection], of: LimitEvidence) -> tuple[Accepted, ...]:
+def accepted(limits: Sequence[LimitSection], of: LimitEvidence) -> tuple[LimitResult, ...]:
     """The result of each limit."""
     return tuple(_accepted(limit, of) for limit in limits)
 
 
-def _accepted(limit: LimitSection, of: LimitEvidence) -> Accepted:
-    found = _measured(limit, of)
-    if isinstance(found, str):
-        return Accepted(limit, "undecided", reason=found)
-    return judged(limit, found)
+def _accepted(limit: LimitSection, of: LimitEvidence) -> LimitResult:
+    measured = _measured(limit, of)
+    if isinstance(measured, str):
+        return LimitResult(limit, "undecided", reason=measured)
+    return judged(limit, measured)
 
 
-def judged(limit: LimitSection, found: MeasuredValues) -> Accepted:
+def judged(limit: LimitSection, measured: MeasuredValues) -> LimitResult:
     """The result for measured values: they pass if all do, and fail if any does.
 
     Examples
     --------
     >>> limit = LimitSection(quantity="resonance_hz", min=50.0)
-    >>> one = judged(limit, MeasuredValues.around(np.array([51.0]), np.array([2.0]), "Hz"))
-    >>> one.result, one.times
+    >>> result = judged(limit, MeasuredValues.around(np.array([51.0]), np.array([2.0]), "Hz"))
+    >>> result.result, result.times
     ('undecided', 4.0)
     >>> judged(limit, MeasuredValues.around(np.array([53.0]), np.array([2.0]), "Hz")).result
     'pass'
     """
-    inside, outside = np.full(len(found.value), inf), np.full(len(found.value), -inf)
+    inside, outside = np.full(len(measured.value), inf), np.full(len(measured.value), -inf)
     if limit.min is not None:
-        inside, outside = found.low - limit.min, limit.min - found.high
+        inside, outside = measured.low - limit.min, limit.min - measured.high
     if limit.max is not None:
-        inside, outside = np.minimum(inside, limit.max - found.high), np.maximum(outside, found.low - limit.max)
+        inside, outside = np.minimum(inside, limit.max - measured.high), np.maximum(outside, measured.low - limit.max)
     failed, passed = bool((outside > 0).any()), bool((inside > 0).all())
     i = int(np.argmax(outside) if failed else np.argmin(inside))
-    value, low, high = (float(x[i]) for x in (found.value, found.low, found.high))
+    value, low, high = (float(x[i]) for x in (measured.value, measured.low, measured.high))
     upper = limit.max is not None and (limit.min is None or limit.max - value < value - limit.min)
     bound = 0.0 if value == low == high else high - value if upper != failed else value - low
-    at_hz = nan if found.at_hz is None else float(found.at_hz[i])
+    at_hz = nan if measured.at_hz is None else float(measured.at_hz[i])
     result: Result = "fail" if failed else "pass" if passed else "undecided"
     times = nan
     if result == "undecided":
         away = abs(value - (limit.max if upper else limit.min or 0.0))  # type: ignore[operator]
         times = (bound / away) ** 2 if 0 < bound <= sqrt(_FACTOR_MAX) * away else inf
-    return Accepted(limit, result, value, bound, found.unit, at_hz, times)
+    return LimitResult(limit, result, value, bound, measured.unit, at_hz, times)
 
 
 def _measured(limit: LimitSection, of: LimitEvidence) -> MeasuredValues | str:

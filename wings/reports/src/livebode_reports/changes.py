@@ -12,7 +12,7 @@ from livebode.configuration import FitSection, LoopSection, recorded_configurati
 from livebode.core import LivebodeError, normal_quantile
 from livebode.fitting import Fit
 from livebode.language import Message
-from livebode_reports.difference import ALPHA, Compared
+from livebode_reports.difference import ALPHA, RunDifferences
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class Changes:
     margin_words: str
 
 
-def changes(of: Compared) -> Changes:
+def changes(of: RunDifferences) -> Changes:
     """Fit the same model to the compared response of each run, and compute the margins of the described loops."""
     own = [recorded_configuration(run.summary) for run in of.runs]
     section = next((s["fit"] for s in own if "fit" in s), None)
@@ -73,8 +73,8 @@ def changes(of: Compared) -> Changes:
     model = FitSection.model_validate(section)
     try:
         fits = [
-            fit_averaged(replace(average, response=one, words="the compared response"), model)[0]
-            for average, one in zip(of.averages, (of.overall.before, of.overall.after))
+            fit_averaged(replace(average, response=response, words="the compared response"), model)[0]
+            for average, response in zip(of.averages, (of.overall.before, of.overall.after))
         ]
     except LivebodeError as error:
         return Changes((), Message("No parameters: {why}.", why=error), (), Message("No margins: they need a fit."))
@@ -83,7 +83,7 @@ def changes(of: Compared) -> Changes:
             words = Message("No parameters: the fit to {run} was rejected: {why}.", run=run.path.name, why=fit.sentence)
             return Changes((), words, (), Message("No margins: they need a fit."))
     rows = [{name: (value, bound, unit) for name, value, bound, unit in fit.rows()} for fit in fits]
-    found = _table(rows)
+    quantities = _table(rows)
     words = Message(
         "The {model} model, fitted to the compared responses at {lines} lines.",
         model=fits[0].model.name,
@@ -93,29 +93,29 @@ def changes(of: Compared) -> Changes:
     try:
         read = [_margins(fit, loop) for fit, loop in zip(fits, loops)]
     except LivebodeError as error:
-        return Changes(found, words, (), Message("No margins: {why}.", why=error))
+        return Changes(quantities, words, (), Message("No margins: {why}.", why=error))
     known = [m for m in read if m is not None and m.ok[0]]
     if len(known) < len(read):
         return Changes(
-            found,
+            quantities,
             words,
             (),
             Message("No margins: they need a described loop in both runs that is stable with the fitted model."),
         )
-    return Changes(found, words, _table([_rows(m) for m in known]), "")
+    return Changes(quantities, words, _table([_rows(m) for m in known]), "")
 
 
 def _margins(fit: Fit, loop: LoopSection) -> Margins | None:
     built = loop.build(fit.rate_hz)
     if built.feedback is None:
         return None
-    found = margins(fit.parameters, OpenLoop(fit.model, built, fit.rate_hz, fit.hold), fit.band_hz)
-    return found if fit.measured is None else against_lines(found, fit.measured, built)
+    result = margins(fit.parameters, OpenLoop(fit.model, built, fit.rate_hz, fit.hold), fit.band_hz)
+    return result if fit.measured is None else against_lines(result, fit.measured, built)
 
 
-def _rows(found: Margins) -> dict[str, tuple[float, float, str]]:
-    bound = found.bound()[0]
-    values = zip(found.names, found.value[0], bound, found.units)
+def _rows(fitted: Margins) -> dict[str, tuple[float, float, str]]:
+    bound = fitted.bound()[0]
+    values = zip(fitted.names, fitted.value[0], bound, fitted.units)
     return {name.replace("_", " "): (float(v), float(b), unit) for name, v, b, unit in values if isfinite(v)}
 
 

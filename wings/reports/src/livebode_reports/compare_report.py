@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from livebode.analysis import Averaged
+from livebode.analysis import RunMean
 from livebode.configuration import ReportSection, recorded_configuration, recorded_report
 from livebode.core import TONES, Document, Finding, Paragraph, Part, Picture, PrintedTable, Section, with_bound
 from livebode.estimates import kind_of
@@ -22,7 +22,7 @@ from livebode.records import RunRecord, event_counts, read_summary
 from livebode_reports import first_page
 from livebode_reports.changes import Changes, QuantityChange, changes, percent
 from livebode_reports.comparison_verdict import detectable, verdict
-from livebode_reports.difference import ALPHA, Compared, Difference, compare
+from livebode_reports.difference import ALPHA, Difference, RunDifferences, compare
 from livebode_reports.kinds import rule_of
 from livebode_reports.limits import limits
 from livebode_reports.report_data import entry_title, read, written
@@ -42,7 +42,7 @@ def comparison_of(before: Path, after: Path) -> Any:
 class Comparison:
     """Two runs compared, and the sentences, tables and document that report it."""
 
-    found: Compared
+    differences: RunDifferences
     changes: Changes
 
     @classmethod
@@ -56,13 +56,13 @@ class Comparison:
         cls, before: RunRecord, after: RunRecord, *, ignore_below: float = 0.0, together: int = 1
     ) -> Comparison:
         """Compare two opened runs; `together` as in `compare`."""
-        found = compare(before, after, ignore_below=ignore_below, together=together)
-        return cls(found, changes(found))
+        differences = compare(before, after, ignore_below=ignore_below, together=together)
+        return cls(differences, changes(differences))
 
     @property
     def later(self) -> RunRecord:
         """The run after the change."""
-        return self.found.runs[1]
+        return self.differences.runs[1]
 
     @property
     def printed(self) -> Iterator[str]:
@@ -75,12 +75,12 @@ class Comparison:
     @property
     def sentences(self) -> tuple[Finding, ...]:
         """The verdict, the most urgent finding first."""
-        return verdict(self.found, self.changes)
+        return verdict(self.differences, self.changes)
 
     @property
     def tables(self) -> tuple[str, ...]:
         """Tables for the terminal: ratio at each line, changes of parameters and margins."""
-        d = self.found.overall
+        d = self.differences.overall
         rows = [
             f"{f:>10g} Hz {_ratio_columns(ratio, bound)}{'  differs' * bool(on)}"
             for f, ratio, bound, on in zip(d.before.lines.frequency_hz, d.ratio.tolist(), d.bound.tolist(), d.differs)
@@ -96,20 +96,20 @@ class Comparison:
 
     def plain(self) -> dict[str, Any]:
         """For JSON."""
-        places = [{"from": p.low, "to": p.high, "back": p.back} | _lines(p.difference) for p in self.found.places]
+        places = [{"from": p.low, "to": p.high, "back": p.back} | _lines(p.difference) for p in self.differences.places]
         return {
-            "before": self.found.runs[0].place,
-            "after": self.found.runs[1].place,
-            "quantity": self.found.overall.before.quantity,
-            "unit": self.found.overall.before.unit,
+            "before": self.differences.runs[0].place,
+            "after": self.differences.runs[1].place,
+            "quantity": self.differences.overall.before.quantity,
+            "unit": self.differences.overall.before.unit,
             "alpha": ALPHA,
-            "tested_together": self.found.overall.m,
-            "ignore_below": self.found.overall.ignore_below,
-            "lines": _lines(self.found.overall)["lines"],
+            "tested_together": self.differences.overall.m,
+            "ignore_below": self.differences.overall.ignore_below,
+            "lines": _lines(self.differences.overall)["lines"],
             "places": places,
             "parameters": [_plain_change(c) for c in self.changes.parameters],
             "margins": [_plain_change(c) for c in self.changes.margins],
-            "warnings": list(self.found.warnings),
+            "warnings": list(self.differences.warnings),
             "sentences": [finding.text for finding in self.sentences],
         }
 
@@ -127,10 +127,10 @@ class Comparison:
         appendix
             Add the settings that differ.
         """
-        one, other = self.found.runs
+        before, other = self.differences.runs
         header = recorded_report(other.summary) if header is None else header
         accepted = read(other.path, header=header, entry=other.entry_name).accepted if header.limits else ()
-        runs = header.machine or tr("{before} and {after}", before=run_name(one), after=run_name(other))
+        runs = header.machine or tr("{before} and {after}", before=run_name(before), after=run_name(other))
         title = " · ".join(filter(None, (runs, entry_title(other))))
         sections = [
             limits(accepted), self.response(), self._places(), self._parameters(), self.how(), self.events(),
@@ -159,28 +159,28 @@ class Comparison:
             (self.changes.parameter_words, self.changes.parameters), (self.changes.margin_words, self.changes.margins),
         )  # fmt: skip
         parts = tuple(Paragraph(worded(words)) for words, table in absent if words and not table)
-        paths = pairs([(tr("before"), self.found.runs[0].place), (tr("after"), self.found.runs[1].place)])
-        found = (Section(tr("Details of the measurement"), (paths,)), _settings(*self.found.runs))
-        return (*found, Section(tr("Not in this report"), parts)) if parts else found
+        paths = pairs([(tr("before"), self.differences.runs[0].place), (tr("after"), self.differences.runs[1].place)])
+        sections = (Section(tr("Details of the measurement"), (paths,)), _settings(*self.differences.runs))
+        return (*sections, Section(tr("Not in this report"), parts)) if parts else sections
 
     def facts(self, *others: Comparison) -> list[tuple[str, str]]:
         """Rows of the title block; of a matrix run with the `others` of its entries."""
         rows = [
-            (tr("before"), run_name(self.found.runs[0])), (tr("after"), run_name(self.found.runs[1])),
+            (tr("before"), run_name(self.differences.runs[0])), (tr("after"), run_name(self.differences.runs[1])),
             *((words, _measured(run, average)) for words, run, average in zip(
-                (tr("before measured"), tr("after measured")), self.found.runs, self.found.averages
+                (tr("before measured"), tr("after measured")), self.differences.runs, self.differences.averages
             )),
-            (tr("responses"), " / ".join(number(a.count, ",") for a in self.found.averages)),
-            (tr("compared at"), _span(self.found)),
-            (tr("smallest detectable change"), detectable(*(one.found.overall for one in (self, *others)))),
+            (tr("responses"), " / ".join(number(a.count, ",") for a in self.differences.averages)),
+            (tr("compared at"), _span(self.differences)),
+            (tr("smallest detectable change"), detectable(*(c.differences.overall for c in (self, *others)))),
         ]  # fmt: skip
         return [(name, value) for name, value in rows if value]
 
     def picture(self) -> Picture:
         """Both responses, and their ratio."""
-        d = self.found.overall
+        d = self.differences.overall
         how = tr("means of the runs")
-        if self.found.places:
+        if self.differences.places:
             how = tr("means over the common places, each place counted alike")
         caption = tr(
             "Before and after: {how}, with 95 % bounds. Below: ratio after/before, with the bound that covers all {m} "
@@ -197,11 +197,13 @@ class Comparison:
             "“Detectable” is the smallest change that this comparison finds with a probability of 95 %: a smaller one "
             "may be there and not be seen."
         )  # fmt: skip
-        return Section(tr("How it was compared"), (Paragraph(words), Paragraph(_how_tested(self.found.overall.m))))
+        return Section(
+            tr("How it was compared"), (Paragraph(words), Paragraph(_how_tested(self.differences.overall.m)))
+        )
 
     def response(self) -> Section:
         """Both responses and their ratio at each line."""
-        d = self.found.overall
+        d = self.differences.overall
         radius = [r.bound(BOUND_95) for r in (d.before, d.after)]
         rows = [
             (
@@ -225,15 +227,15 @@ class Comparison:
         return Section(tr("Frequency response"), (table,))
 
     def _places(self) -> Section | None:
-        places = self.found.places
+        places = self.differences.places
         if not places:
             return None
         caption = tr("Change of the magnitude at each place and line, forward and return; dots mark those that differ.")
         data = {
-            "frequency_hz": self.found.overall.before.lines.frequency_hz,
+            "frequency_hz": self.differences.overall.before.lines.frequency_hz,
             "places": [(p.low, p.high, p.back, p.difference.ratio, p.difference.differs) for p in places],
         }
-        found = [
+        rows = [
             (
                 f"{number(p.low, '.3g')} … {number(p.high, '.3g')}",
                 tr("return") if p.back else tr("forward"), number(f, "g"),
@@ -244,15 +246,15 @@ class Comparison:
             if p.difference.differs[i]
         ]  # fmt: skip
         parts: list[Part] = [Picture("places", data, caption)]
-        if found:
-            left_out = len(found) - _PLACES_SHOWN
+        if rows:
+            left_out = len(rows) - _PLACES_SHOWN
             note = trn(
                 "{n:,} more row is not listed; the picture shows all.",
                 "{n:,} more rows are not listed; the picture shows all.",
                 left_out,
             )
             headings = (tr("place"), tr("direction"), "Hz", tr("ratio dB"), "±", tr("ratio °"), "±", "p")
-            shown = tuple(found[:_PLACES_SHOWN])
+            shown = tuple(rows[:_PLACES_SHOWN])
             parts.append(PrintedTable(headings, shown, tuple(range(2, 8)), note if left_out > 0 else ""))
         return Section(tr("By place"), tuple(parts))
 
@@ -279,11 +281,11 @@ class Comparison:
 
     def events(self) -> Section:
         """Events of both runs."""
-        counts = [sum(map(event_counts, run.each_event_and_damage()), Counter[str]()) for run in self.found.runs]
+        counts = [sum(map(event_counts, run.each_event_and_damage()), Counter[str]()) for run in self.differences.runs]
         kinds = sorted(counts[0].keys() | counts[1].keys())
         rows = tuple((worded(kind), *(number(count[kind], ",") for count in counts)) for kind in kinds)
         parts: list[Part] = [PrintedTable((tr("kind"), tr("before"), tr("after")), rows, (1, 2))] if rows else []
-        for run, when in zip(self.found.runs, (tr("Before"), tr("After"))):
+        for run, when in zip(self.differences.runs, (tr("Before"), tr("After"))):
             monitoring = run.summary.get("monitoring", {})
             judged = monitoring.get("baseline") is not None and "message" in monitoring
             message: str = Message("changes are not assessed.")
@@ -313,21 +315,21 @@ def _how_tested(m: int) -> str:
 
 def _settings(before: RunRecord, after: RunRecord) -> Section:
     """Differences between the configurations."""
-    one, other = (set(_flat(recorded_configuration(run.summary))) for run in (before, after))
-    rows = tuple((*key, _of(one, key), _of(other, key)) for key in sorted({line[:1] for line in one ^ other}))
+    first, other = (set(_flat(recorded_configuration(run.summary))) for run in (before, after))
+    rows = tuple((*key, _of(first, key), _of(other, key)) for key in sorted({line[:1] for line in first ^ other}))
     if not rows:
         return Section(tr("Settings"), (Paragraph(tr("Both runs have the same settings.")),))
     return Section(tr("Settings that differ"), (PrintedTable((tr("setting"), tr("before"), tr("after")), rows),))
 
 
 def _flat(values: dict[str, Any], path: str = "") -> list[tuple[str, str]]:
-    found = []
+    entries = []
     for name, value in values.items():
         if isinstance(value, dict):
-            found += _flat(value, f"{path}{name}.")
+            entries += _flat(value, f"{path}{name}.")
         elif value is not None:
-            found.append((path + name, json.dumps(value, ensure_ascii=False)))
-    return found
+            entries.append((path + name, json.dumps(value, ensure_ascii=False)))
+    return entries
 
 
 def _of(lines: set[tuple[str, str]], key: tuple[str, ...]) -> str:
@@ -351,7 +353,7 @@ def run_name(run: RunRecord) -> str:
     return str(run.path.resolve().name)
 
 
-def _measured(run: RunRecord, average: Averaged) -> str:
+def _measured(run: RunRecord, average: RunMean) -> str:
     """When a run was measured; of one without a clock, when it was written."""
     return first_page.measured_at(run, average.spans_s[0]) or written(run.path / "run.json")
 
@@ -382,7 +384,7 @@ def _p(p: float) -> str:
     return number(p, ".2g") if isfinite(p) else "—"
 
 
-def _span(of: Compared) -> str:
+def _span(of: RunDifferences) -> str:
     f = of.overall.before.lines.frequency_hz
     text = trn("{n:,} line, {low:g} … {high:g} Hz", "{n:,} lines, {low:g} … {high:g} Hz", len(f), low=f[0], high=f[-1])
     if not of.places:

@@ -74,8 +74,8 @@ def comparison_figure(
         heading(figure, look, tr("Before and after"), facts, 0.085)
         turn = unwrapped(np.degrees(np.angle(before.value)), np.zeros(len(f), dtype=bool))
         drawn = [
-            _response(panels[:2], f * 1.004**side, one, turn, colour, name)
-            for one, colour, side, name in ((before, look.run, -1, "before"), (after, look.newest, 1, "after"))
+            _response(panels[:2], f * 1.004**side, response, turn, colour, name)
+            for response, colour, side, name in ((before, look.run, -1, "before"), (after, look.newest, 1, "after"))
         ]
         for axes, values, room in zip(panels, zip(*drawn), (3.0, 10.0)):
             _squeeze(axes, np.concatenate(values), room)
@@ -94,11 +94,11 @@ def comparison_figure(
 
 
 def _response(
-    panels: list[Axes], f: Floats, one: Response, turn: Floats, colour: str, name: str
+    panels: list[Axes], f: Floats, response: Response, turn: Floats, colour: str, name: str
 ) -> tuple[Floats, Floats]:
     """Draw magnitude and phase, and return them."""
-    value = np.where(one.valid, one.value, np.nan)
-    radius = one.bound(MEAN_C)
+    value = np.where(response.valid, response.value, np.nan)
+    radius = response.bound(MEAN_C)
     (low, high), half = bound_db(value, radius), bound_deg(value, radius)
     db, deg = decibels(value), np.degrees(np.angle(value))
     deg = deg - 360 * np.rint((deg - turn) / 360)
@@ -124,8 +124,8 @@ def _ratio(
         axes.axhline(0, color=look.muted, linewidth=0.9)
         known = np.isfinite(under) & np.isfinite(middle)
         axes.vlines(f[known], under[known], over[known], color=look.ink, linewidth=1.2, alpha=0.7, gid="ratio bound")
-        for at, face in ((differs, look.ink), (~differs, look.paper)):
-            axes.plot(f[at], middle[at], "o", markersize=4.5, markeredgecolor=look.ink, markerfacecolor=face,
+        for mask, face in ((differs, look.ink), (~differs, look.paper)):
+            axes.plot(f[mask], middle[mask], "o", markersize=4.5, markeredgecolor=look.ink, markerfacecolor=face,
                       gid="differs" if face == look.ink else "same")  # fmt: skip
         _squeeze(axes, np.append(middle, 0.0), room)
 

@@ -11,29 +11,29 @@ from numpy.typing import NDArray
 from livebode.core import Finding, Tone
 from livebode.language import listed, number, tr, trn, worded
 from livebode_reports.changes import Changes, QuantityChange, percent
-from livebode_reports.difference import Compared, ComparedPlace, Difference
+from livebode_reports.difference import Difference, PlaceDifference, RunDifferences
 from livebode_reports.events import EventSummary, alarms
 from livebode_reports.wording import polar_phrase
 
 _URGENT: tuple[Tone, ...] = ("alarm", "differs", "check", "open", "ok")
 
 
-def verdict(found: Compared, changes: Changes) -> tuple[Finding, ...]:
+def verdict(differences: RunDifferences, changes: Changes) -> tuple[Finding, ...]:
     """The findings, the most urgent first."""
     findings = [
-        *_alarms(found),
-        *(Finding("check", worded(text)) for text in found.warnings),
-        _overall(found.overall),
-        *_by_place(found.places),
+        *_alarms(differences),
+        *(Finding("check", worded(text)) for text in differences.warnings),
+        _overall(differences.overall),
+        *_by_place(differences.places),
         *_parameters(changes.parameters),
         *_margins(changes.margins),
     ]
     return tuple(sorted(findings, key=lambda finding: _URGENT.index(finding.tone)))
 
 
-def _alarms(found: Compared) -> Iterator[Finding]:
+def _alarms(differences: RunDifferences) -> Iterator[Finding]:
     """Alarms of both runs; none for a finished run without a baseline."""
-    for run, when in zip(found.runs, (tr("Before"), tr("After"))):
+    for run, when in zip(differences.runs, (tr("Before"), tr("After"))):
         if run.summary.get("monitoring", {}).get("baseline") is not None or not run.finished:
             for finding in alarms(run, EventSummary.of(run.each_event_and_damage())):
                 if finding.tone != "ok":
@@ -68,7 +68,7 @@ def _ignored(d: Difference) -> str:
     )  # fmt: skip
 
 
-def _by_place(places: tuple[ComparedPlace, ...]) -> Iterator[Finding]:
+def _by_place(places: tuple[PlaceDifference, ...]) -> Iterator[Finding]:
     if not places:
         return
     if not any(np.isfinite(p.difference.p).any() for p in places):
@@ -103,8 +103,8 @@ def detectable(*each: Difference) -> str:
     return _sizes(seen) if seen.size else ""
 
 
-def _seen(found: Sequence[Difference]) -> str:
-    return tr("detectable: {sizes}", sizes=_sizes(np.concatenate([d.seen[np.isfinite(d.p)] for d in found])))
+def _seen(places: Sequence[Difference]) -> str:
+    return tr("detectable: {sizes}", sizes=_sizes(np.concatenate([d.seen[np.isfinite(d.p)] for d in places])))
 
 
 def _sizes(seen: NDArray[np.float64]) -> str:

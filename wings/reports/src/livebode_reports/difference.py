@@ -8,7 +8,7 @@ from math import log
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.analysis import Averaged, averaged
+from livebode.analysis import RunMean, averaged
 from livebode.arrays import Floats
 from livebode.configuration import TrackingSection, recorded_configuration
 from livebode.core import PER_LINE, GridError, Lines, Response, Responses, same_frequencies, same_rate, widened
@@ -109,7 +109,7 @@ class Difference:
 
 
 @dataclass(frozen=True, eq=False)
-class ComparedPlace:
+class PlaceDifference:
     """The difference at a place of both runs: an interval of the schedule, forward (rising) or return."""
 
     low: float
@@ -119,7 +119,7 @@ class ComparedPlace:
 
 
 @dataclass(frozen=True, eq=False)
-class Compared:
+class RunDifferences:
     """Two runs and their differences, over all and by place, with warnings.
 
     Attributes
@@ -135,13 +135,13 @@ class Compared:
     """
 
     runs: tuple[RunRecord, RunRecord]
-    averages: tuple[Averaged, Averaged]
+    averages: tuple[RunMean, RunMean]
     overall: Difference
-    places: tuple[ComparedPlace, ...]
+    places: tuple[PlaceDifference, ...]
     warnings: tuple[str, ...]
 
 
-def compare(before: RunRecord, after: RunRecord, *, ignore_below: float = 0.0, together: int = 1) -> Compared:
+def compare(before: RunRecord, after: RunRecord, *, ignore_below: float = 0.0, together: int = 1) -> RunDifferences:
     """Compare two runs; lines whose |G₂/G₁ − 1| is less than `ignore_below` do not count as different.
 
     Entries of a matrix that are tested `together` have no schedule, and so no places.
@@ -155,7 +155,7 @@ def compare(before: RunRecord, after: RunRecord, *, ignore_below: float = 0.0, t
     """
     _refuse(before, after)
     both = averaged(before), averaged(after)
-    common, at = _common(before.lines, after.lines)
+    common, indices = _common(before.lines, after.lines)
     warnings = _about(before, after, len(common))
     means: list[dict[tuple[int, bool], Responses]] = []
     span = (max(a.spans[0] for a in both), min(a.spans[1] for a in both))
@@ -171,33 +171,33 @@ def compare(before: RunRecord, after: RunRecord, *, ignore_below: float = 0.0, t
         )
     shared = sorted(means[0].keys() & means[1].keys()) if means else []
     if not shared:
-        one, other = (_on(a.response, common, i) for a, i in zip(both, at))
-        difference = Difference.of(one, other, ignore_below=ignore_below, together=together)
-        return Compared((before, after), both, difference, (), tuple(warnings))
-    pairs = [tuple(_on(m[key][0], common, i) for m, i in zip(means, at)) for key in shared]
+        first, other = (_on(a.response, common, i) for a, i in zip(both, indices))
+        difference = Difference.of(first, other, ignore_below=ignore_below, together=together)
+        return RunDifferences((before, after), both, difference, (), tuple(warnings))
+    pairs = [tuple(_on(m[key][0], common, i) for m, i in zip(means, indices)) for key in shared]
     known = [_known(a) & _known(b) for a, b in pairs]
     m = max(int(np.sum(known)), 1)
     edges = np.linspace(*span, _PLACES + 1)
     places = tuple(
-        ComparedPlace(float(edges[i]), float(edges[i + 1]), back, Difference.of(a, b, m, ignore_below=ignore_below))
+        PlaceDifference(float(edges[i]), float(edges[i + 1]), back, Difference.of(a, b, m, ignore_below=ignore_below))
         for (i, back), (a, b) in zip(shared, pairs)
     )
     joined = [_together([pair[i] for pair in pairs], np.array(known)) for i in (0, 1)]
     overall = Difference.of(joined[0], joined[1], ignore_below=ignore_below)
-    return Compared((before, after), both, overall, places, tuple(warnings))
+    return RunDifferences((before, after), both, overall, places, tuple(warnings))
 
 
 def _refuse(before: RunRecord, after: RunRecord) -> None:
-    for what in ("quantity", "unit"):
-        one, other = (run.found.get(what, "") for run in (before, after))
-        if one != other:
+    for attribute in ("quantity", "unit"):
+        first, other = (run.found.get(attribute, "") for run in (before, after))
+        if first != other:
             raise GridError(
                 "not-alike",
-                f"{before.path.name!r} has the {what} {one!r} and {after.path.name!r} {other!r}: such responses cannot "
-                "be compared",
-                f"compare runs of the same {what}",
-                what=what,
-                values=[one, other],
+                f"{before.path.name!r} has the {attribute} {first!r} and {after.path.name!r} {other!r}: such responses "
+                "cannot be compared",
+                f"compare runs of the same {attribute}",
+                what=attribute,
+                values=[first, other],
             )
 
 
@@ -231,14 +231,16 @@ def _about(before: RunRecord, after: RunRecord, common: int) -> list[str]:
                 after=len(after.lines),
             )
         )
-    one, other = (recorded_configuration(run.summary).get("tracking", {}) for run in (before, after))
-    for key, what in (
+    first, other = (recorded_configuration(run.summary).get("tracking", {}) for run in (before, after))
+    for key, setting in (
         ("estimator", Message("estimators")), ("hann", Message("windows")), ("differenced", Message("differencing"))
     ):  # fmt: skip
         usual = getattr(TrackingSection(), key)
-        if (a := one.get(key, usual)) != (b := other.get(key, usual)):
+        if (a := first.get(key, usual)) != (b := other.get(key, usual)):
             words.append(
-                Message("Different {what} ({before} and {after}) may cause differences.", what=what, before=a, after=b)
+                Message(
+                    "Different {what} ({before} and {after}) may cause differences.", what=setting, before=a, after=b
+                )
             )
     if not same_rate(before.lines.rate_hz, after.lines.rate_hz):
         words.append(
@@ -258,7 +260,7 @@ def _averages(run: RunRecord) -> bool:
     return bool(run.summary.get("configuration", {}).get("tracking", {}).get("average"))
 
 
-def _overlap(both: tuple[Averaged, Averaged], span: tuple[float, float]) -> list[str]:
+def _overlap(both: tuple[RunMean, RunMean], span: tuple[float, float]) -> list[str]:
     spans = Message.conjunction(Message("{low:.4g} … {high:.4g}", low=a.spans[0], high=a.spans[1]) for a in both)
     if span[1] <= span[0]:
         return [
@@ -315,14 +317,14 @@ def _by_place(run: RunRecord, span: tuple[float, float]) -> dict[tuple[int, bool
     return {key: mean.response() for key, mean in means.items() if mean.rows * share >= _WINDOWS_MIN}
 
 
-def _on(one: Response, lines: Lines, at: NDArray[np.intp]) -> Response:
+def _on(response: Response, lines: Lines, indices: NDArray[np.intp]) -> Response:
     """The response at some of its lines."""
-    rows = {name: getattr(one, name)[at] for name in PER_LINE}
-    return replace(one, lines=lines, **rows)
+    rows = {name: getattr(response, name)[indices] for name in PER_LINE}
+    return replace(response, lines=lines, **rows)
 
 
-def _known(one: Response) -> NDArray[np.bool_]:
-    return np.asarray(one.valid & np.isfinite(one.sigma))
+def _known(response: Response) -> NDArray[np.bool_]:
+    return np.asarray(response.valid & np.isfinite(response.sigma))
 
 
 def _together(parts: list[Response], known: NDArray[np.bool_]) -> Response:

@@ -40,13 +40,13 @@ class EventSummary:
 
     @classmethod
     def of(cls, events: Iterable[Event]) -> EventSummary:
-        found = cls()
+        summary = cls()
         for event in events:
-            for one in each_event(event):
-                found._add(one)
+            for single in each_event(event):
+                summary._add(single)
             for kind, count in event_counts(event).items():
-                found.kinds.setdefault(kind, EventsOfKind(event, event)).count += count
-        return found
+                summary.kinds.setdefault(kind, EventsOfKind(event, event)).count += count
+        return summary
 
     def _add(self, event: Event) -> None:
         kind = self.kinds.setdefault(event.kind, EventsOfKind(event, event))
@@ -115,14 +115,14 @@ def alarms(run: RunRecord, event_summary: EventSummary) -> tuple[Finding, ...]:
 
 def _newest(event_summary: EventSummary) -> list[Event]:
     """The newest report of each change that has not cleared."""
-    found: dict[tuple[str, str], Event] = {}
+    newest: dict[tuple[str, str], Event] = {}
     for event in event_summary.in_full:
         key = str(event.details.get("what")), str(event.details.get("place_m"))
         if event.kind in ("change", "change-corrected"):
-            found[key] = event
+            newest[key] = event
         elif event.kind == "change-cleared":
-            found.pop(key, None)
-    return list(found.values())
+            newest.pop(key, None)
+    return list(newest.values())
 
 
 def _so_far(run: RunRecord, event_summary: EventSummary) -> Finding:

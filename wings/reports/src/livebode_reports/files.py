@@ -50,6 +50,6 @@ def comparison_page(before: Path, after: Path, language: str) -> str:
     from livebode_reports.html import to_html
 
     with in_language(language):
-        found = comparison_of(before, after).of(before, after)
+        comparison = comparison_of(before, after).of(before, after)
         header = trusted(recorded_report(read_summary(after)[0]), after)
-        return to_html(found.document(datetime.now(UTC), header=header))
+        return to_html(comparison.document(datetime.now(UTC), header=header))

@@ -11,7 +11,7 @@ from livebode.configuration import ReportSection
 from livebode.core import ConfigError, Finding, Logo, Tone, date_and_time
 from livebode.language import tr
 from livebode.records import RunRecord
-from livebode_reports.acceptance import Accepted
+from livebode_reports.acceptance import LimitResult
 from livebode_reports.limits import about_limits
 
 _URGENT: tuple[Tone, ...] = ("fail", "alarm", "differs", "undecided", "pass", "check", "ok", "open")
@@ -48,7 +48,9 @@ def measured_at(run: RunRecord, first_s: float) -> str:
     return "" if unix_s is None else date_and_time(float(unix_s))
 
 
-def result(findings: Sequence[Finding], accepted: Sequence[Accepted] = (), not_judged: str = "") -> tuple[Finding, ...]:
+def result(
+    findings: Sequence[Finding], accepted: Sequence[LimitResult] = (), not_judged: str = ""
+) -> tuple[Finding, ...]:
     """The verdict of the report, and the next findings that a person should see.
 
     `not_judged` replaces a verdict where only the quality of the measurement is known.
@@ -129,9 +131,9 @@ def _check_png(path: Path, data: bytes) -> None:
 def _check_svg(path: Path, data: bytes) -> None:
     from xml.etree import ElementTree
 
-    if found := _ACTIVE.search(data):
-        what = found.group().decode("ascii", "replace")
-        raise _unusable(path, f"contains {what!r}: a logo may not load or execute anything")
+    if match := _ACTIVE.search(data):
+        content = match.group().decode("ascii", "replace")
+        raise _unusable(path, f"contains {content!r}: a logo may not load or execute anything")
     try:
         root = ElementTree.fromstring(data)
     except ElementTree.ParseError:

@@ -72,8 +72,8 @@ class _Page:
             return ""
         first, *more = self._of.result
         word = f'<p class="word {first.tone}">{_text(worded(self._of.tones[first.tone]))}</p>'
-        rest = self._findings(tuple(more)) if more else ""
-        return f'<div class="result {first.tone}">{word}<p class="why">{_text(first.text)}</p></div>\n{rest}'
+        further = self._findings(tuple(more)) if more else ""
+        return f'<div class="result {first.tone}">{word}<p class="why">{_text(first.text)}</p></div>\n{further}'
 
     def _findings(self, findings: tuple[Finding, ...]) -> str:
         rows = "\n".join(

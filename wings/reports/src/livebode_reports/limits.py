@@ -8,7 +8,7 @@ from math import ceil, isfinite, isinf
 from livebode.configuration import MAGNITUDES, LimitSection
 from livebode.core import TONES, Finding, Paragraph, PrintedTable, Section, with_bound
 from livebode.language import Message, number, tr, trn, worded
-from livebode_reports.acceptance import Accepted
+from livebode_reports.acceptance import LimitResult
 
 _WORDS = {
     "resonance_hz": Message("resonance"), "resonance_damping": Message("resonance damping"),
@@ -21,39 +21,39 @@ _WORDS = {
 }  # fmt: skip
 
 
-def about_limits(found: Sequence[Accepted]) -> list[Finding]:
+def about_limits(accepted: Sequence[LimitResult]) -> list[Finding]:
     """The verdict on the limits, in one sentence for each kind of result."""
-    failed = [a for a in found if a.result == "fail"]
-    undecided = [a for a in found if a.result == "undecided"]
+    failed = [a for a in accepted if a.result == "fail"]
+    undecided = [a for a in accepted if a.result == "undecided"]
     findings = []
     if failed:
         text = trn(
             "{n:,} limit of {all} is not met: {which}.", "{n:,} limits of {all} are not met: {which}.", len(failed),
-            all=len(found), which="; ".join(map(_short, failed)),
+            all=len(accepted), which="; ".join(map(_short, failed)),
         )  # fmt: skip
         findings.append(Finding("fail", text))
     if undecided:
         text = trn(
             "The measurement does not decide {n:,} limit of {all}: {which}.",
             "The measurement does not decide {n:,} limits of {all}: {which}.", len(undecided),
-            all=len(found), which="; ".join(map(_short, undecided)),
+            all=len(accepted), which="; ".join(map(_short, undecided)),
         )  # fmt: skip
         findings.append(Finding("undecided", text))
-    if found and not findings:
+    if accepted and not findings:
         text = trn(
             "{n:,} limit is met, by more than the bound of the measurement.",
-            "All {n:,} limits are met by more than the bounds of the measurement.", len(found),
+            "All {n:,} limits are met by more than the bounds of the measurement.", len(accepted),
         )  # fmt: skip
         findings.append(Finding("pass", text))
     return findings
 
 
-def limits(found: Sequence[Accepted]) -> Section | None:
+def limits(accepted: Sequence[LimitResult]) -> Section | None:
     """The table of the limits; None if there are none."""
-    if not found:
+    if not accepted:
         return None
     headings = (tr("quantity"), tr("limit"), tr("measured"), "±", tr("unit"), tr("result"))
-    rows = tuple((_name(a.limit), _range(a.limit), *_value(a), _result(a)) for a in found)
+    rows = tuple((_name(a.limit), _range(a.limit), *_value(a), _result(a)) for a in accepted)
     rule = tr(
         "A limit is met only if the measured value is inside by more than its 95 % bound, and failed only if it is "
         "outside by more than that (guard band after ISO 14253-1 and JCGM 106). Otherwise the measurement does not "
@@ -82,7 +82,7 @@ def _range(limit: LimitSection) -> str:
     return ", ".join(filter(None, (low, high)))
 
 
-def _value(a: Accepted) -> tuple[str, str, str]:
+def _value(a: LimitResult) -> tuple[str, str, str]:
     if a.reason:
         return "—", "—", ""
     unit = a.unit if not isfinite(a.at_hz) else tr("{unit}, at {at:g} Hz", unit=a.unit, at=a.at_hz)
@@ -93,7 +93,7 @@ def _value(a: Accepted) -> tuple[str, str, str]:
     return *with_bound(a.value, a.bound), worded(unit)
 
 
-def _result(a: Accepted) -> str:
+def _result(a: LimitResult) -> str:
     word = worded(TONES[a.result])
     if a.reason:
         return tr("{result}: {why}", result=word, why=worded(a.reason))
@@ -105,7 +105,7 @@ def _result(a: Accepted) -> str:
     return tr("{result}: needs about {factor} times the data", result=word, factor=factor)
 
 
-def _short(a: Accepted) -> str:
+def _short(a: LimitResult) -> str:
     """Quantity, limit and measured value in a sentence."""
     head = f"{_name(a.limit)} {_range(a.limit)}"
     if a.reason:

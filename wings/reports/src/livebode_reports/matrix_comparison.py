@@ -84,7 +84,7 @@ class MatrixComparison:
     @property
     def sentences(self) -> list[str]:
         """The verdicts on all entries, those that differ first."""
-        order = sorted(self.entries, key=lambda name: not self.entries[name].found.overall.differs.any())
+        order = sorted(self.entries, key=lambda name: not self.entries[name].differences.overall.differs.any())
         each = [f"{name}: {finding.text}" for name in order for finding in self.entries[name].sentences]
         return [*self.whole, *each]
 
@@ -94,7 +94,7 @@ class MatrixComparison:
         return [
             "\n\n".join([f"{name}:", *comparison.tables])
             for name, comparison in self.entries.items()
-            if comparison.found.overall.differs.any()
+            if comparison.differences.overall.differs.any()
         ]
 
     def document(self, made: datetime, *, header: ReportSection, appendix: bool = False) -> Document:
@@ -109,19 +109,25 @@ class MatrixComparison:
         appendix
             Add the settings that differ.
         """
-        named = sorted(self.entries.items(), key=lambda one: not one[1].found.overall.differs.any())
-        first, *others = (one for _, one in named)
-        runs = tr("{before} and {after}", before=run_name(first.found.runs[0]), after=run_name(first.found.runs[1]))
+        named = sorted(self.entries.items(), key=lambda item: not item[1].differences.overall.differs.any())
+        first, *others = (comparison for _, comparison in named)
+        runs = tr(
+            "{before} and {after}",
+            before=run_name(first.differences.runs[0]),
+            after=run_name(first.differences.runs[1]),
+        )
         title = header.machine or runs
-        findings = [Finding(f.tone, f"{_arrow(name)}: {f.text}") for name, one in named for f in one.sentences]
-        tone: Tone = "differs" if first.found.overall.differs.any() else "ok"
+        findings = [
+            Finding(f.tone, f"{_arrow(name)}: {f.text}") for name, comparison in named for f in comparison.sentences
+        ]
+        tone: Tone = "differs" if first.differences.overall.differs.any() else "ok"
         findings = [*(Finding(tone, f"{worded(sentence)}.") for sentence in self.whole), *findings]
         return Document(
             kind=tr("Before and after"),
             title=title,
             facts=first_page.facts(header, title, first.facts(*others), made),
             verdict=tuple(findings),
-            sections=(*(_section(name, one) for name, one in named), first.how(), first.events()),
+            sections=(*(_section(name, comparison) for name, comparison in named), first.how(), first.events()),
             foot=" · ".join(filter(None, (title, header.serial_number, header.company))),
             heading=tr("What changed"),
             tones=TONES_OF_A_COMPARISON,
@@ -137,7 +143,9 @@ class MatrixComparison:
         """For JSON."""
         return {
             "entries": {name: comparison.plain() for name, comparison in self.entries.items()},
-            "differing": [name for name, one in self.entries.items() if one.found.overall.differs.any()],
+            "differing": [
+                name for name, comparison in self.entries.items() if comparison.differences.overall.differs.any()
+            ],
             "sentences": self.sentences,
         }
 
@@ -147,8 +155,8 @@ def _arrow(name: str) -> str:
     return name.replace("/", " ← ")
 
 
-def _section(name: str, one: Comparison) -> Section:
+def _section(name: str, comparison: Comparison) -> Section:
     """Picture, smallest detectable change and lines of an entry, under its name."""
-    seen = detectable(one.found.overall)
+    seen = detectable(comparison.differences.overall)
     least = (pairs([(tr("smallest detectable change"), seen)]),) if seen else ()
-    return Section(_arrow(name), (one.picture(), *least, *one.response().parts))
+    return Section(_arrow(name), (comparison.picture(), *least, *comparison.response().parts))

@@ -30,9 +30,9 @@ from livebode.core import (
 from livebode.language import number, tr, trn, worded
 from livebode.records import RunRecord
 from livebode_reports import first_page, sections
-from livebode_reports.acceptance import Accepted
+from livebode_reports.acceptance import LimitResult
 from livebode_reports.events import EventSummary
-from livebode_reports.measured import about_bounds, grid_rows, matrix_in_words, signal_rows
+from livebode_reports.measurement_words import about_bounds, grid_rows, matrix_in_words, signal_rows
 from livebode_reports.report_data import Extent, RunData
 from livebode_reports.run_report import facts, not_judged, record_appendix
 from livebode_reports.verdict import about_record, by_urgency
@@ -101,15 +101,15 @@ def singular_values(of: MatrixReportData) -> Picture:
 
 def how(of: MatrixReportData) -> Section:
     """How it was measured."""
-    found = of.run.found["experiments"]
+    facts = of.run.found["experiments"]
     experiments = trn(
         "{n} experiment of {dwell} periods, the first {settle} of them unused",
         "{n} experiments, each of {dwell} periods, the first {settle} of them unused",
-        found["number"], dwell=found["dwell_periods"], settle=found["settle_periods"],
+        facts["number"], dwell=facts["dwell_periods"], settle=facts["settle_periods"],
     )  # fmt: skip
     repetitions = tr("the newest matrix")
     if of.configuration.get("tracking", {}).get("average"):
-        repetitions = tr("average over all repetitions so far, at most {count}", count=found["memory"])
+        repetitions = tr("average over all repetitions so far, at most {count}", count=facts["memory"])
     rows = [
         *signal_rows(of), *grid_rows(of), (tr("experiments"), experiments), (tr("each matrix"), repetitions),
     ]  # fmt: skip
@@ -153,23 +153,26 @@ def entries(of: MatrixReportData) -> Section:
     return Section(tr("Entries"), (table, Paragraph(more), Listing(commands)))
 
 
-def _entry_row(one: Responses, name: str, reason: np.ndarray) -> tuple[str, ...]:
-    valid, f = one.valid[0], one.lines.frequency_hz
+def _entry_row(response: Responses, name: str, reason: np.ndarray) -> tuple[str, ...]:
+    valid, f = response.valid[0], response.lines.frequency_hz
     counted = tr("{count} of {all}", count=int(valid.sum()), all=valid.size)
     if not valid.any():
         why = ", ".join(sorted({worded(REASONS[code]) for code in reason if code}))
-        return (name, one.unit, f"{counted}: {why}", "—", "—", "—", "—", "—", "—")
-    size, bound = np.where(valid, np.abs(one.value[0]), np.nan), np.where(valid, one.bound(BOUND_95)[0], np.nan)
-    at = int(np.nanargmax(size))
-    db, around, _, _ = polar(complex(one.value[0, at]), float(bound[at]))
-    relative, coherence = bound / size, np.where(valid, one.coherence[0], np.nan)
+        return (name, response.unit, f"{counted}: {why}", "—", "—", "—", "—", "—", "—")
+    size, bound = (
+        np.where(valid, np.abs(response.value[0]), np.nan),
+        np.where(valid, response.bound(BOUND_95)[0], np.nan),
+    )
+    index = int(np.nanargmax(size))
+    db, around, _, _ = polar(complex(response.value[0, index]), float(bound[index]))
+    relative, coherence = bound / size, np.where(valid, response.coherence[0], np.nan)
     widest, where = "—", "—"
     if np.isfinite(relative).any():
         worst = int(np.nanargmax(relative))
         widest, where = number(100 * relative[worst], ".2g"), number(f[worst], "g")
     least = float(np.nanmin(coherence)) if np.isfinite(coherence).any() else float("nan")
     return (
-        name, one.unit, counted, db, around, number(f[at], "g"), widest, where,
+        name, response.unit, counted, db, around, number(f[index], "g"), widest, where,
         number(least, ".4f") if isfinite(least) else "—",
     )  # fmt: skip
 
@@ -202,19 +205,19 @@ def about_columns(newest: MatrixResponses) -> list[Finding]:
     """Findings about the validity of the newest matrix and the separation of the inputs."""
     count, size = newest.value.shape[2] * newest.value.shape[3], lines_of(len(newest.lines))
     wrong = [Finding("check", f"{worded(sentence)}.") for sentence in newest.why(0)]
-    found = wrong or [
+    findings = wrong or [
         Finding("ok", tr("All {count} entries of the newest matrix are valid at {lines}.", count=count, lines=size))
     ]
     known = np.where(np.isfinite(newest.condition[0]), newest.condition[0], -1.0)
-    at = int(known.argmax())
+    index = int(known.argmax())
     together = np.any(newest.reason == REASONS.index("not separated"))
-    if known[at] >= 0 and not together:
+    if known[index] >= 0 and not together:
         text = tr(
             "The experiments separate the inputs: condition number at most {worst:.3g} (at {at:g} Hz).",
-            worst=float(known[at]), at=float(newest.frequency_hz[at]),
+            worst=float(known[index]), at=float(newest.frequency_hz[index]),
         )  # fmt: skip
-        found.append(Finding("ok", text))
-    return found
+        findings.append(Finding("ok", text))
+    return findings
 
 
 def about_responses(of: MatrixReportData) -> Finding:
@@ -237,7 +240,7 @@ def matrix_report(
     header: ReportSection | None = None,
     appendix: bool = False,
     entry: str | None = None,  # noqa: ARG001 - the report of an entry is that of a response
-) -> tuple[Document, tuple[Accepted, ...]]:
+) -> tuple[Document, tuple[LimitResult, ...]]:
     """Build the report of a matrix run: the matrix of Bode plots, singular values, and its entries.
 
     Models, margins and limits belong to one response, so they are in the report of an entry. Arguments are those of

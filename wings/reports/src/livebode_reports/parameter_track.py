@@ -51,27 +51,27 @@ class Track:
 
 def tracks(run: RunRecord, kept: NDArray[np.int64], time_s: Floats) -> dict[str, Track]:
     """Tracks by model, at the responses whose newest samples are `kept`; empty if nothing was fitted."""
-    found: dict[str, Track] = {}
+    by_model: dict[str, Track] = {}
     for table in run.tables("parameters"):
         columns = {name: table.values(name) for name in _COLUMNS}
         for model in dict.fromkeys(columns["model"]):
-            track = found.setdefault(model, Track(time_s, model=model))
+            track = by_model.setdefault(model, Track(time_s, model=model))
             here = columns["model"] == model
             for name in dict.fromkeys(columns["name"][here]):
-                at = here & (columns["name"] == name)
-                _take(track, name, {key: column[at] for key, column in columns.items()}, kept)
-    return found
+                rows = here & (columns["name"] == name)
+                _add(track, name, {key: column[rows] for key, column in columns.items()}, kept)
+    return by_model
 
 
-def _take(track: Track, name: str, rows: dict[str, NDArray[np.generic]], kept: NDArray[np.int64]) -> None:
+def _add(track: Track, name: str, rows: dict[str, NDArray[np.generic]], kept: NDArray[np.int64]) -> None:
     if name not in track.values:
         track.values[name], track.sigmas[name] = (np.full(len(kept), np.nan) for _ in range(2))
     if name == next(iter(track.values)):
         for word, count in zip(*np.unique(rows["status"].astype(str), return_counts=True)):
             track.statuses[str(word)] = track.statuses.get(str(word), 0) + int(count)
     there = np.isin(rows["sample"], kept)
-    at = np.searchsorted(kept, rows["sample"][there])
-    track.values[name][at], track.sigmas[name][at] = rows["value"][there], rows["sigma"][there]
+    places = np.searchsorted(kept, rows["sample"][there])
+    track.values[name][places], track.sigmas[name][places] = rows["value"][there], rows["sigma"][there]
     known = np.flatnonzero(np.isfinite(rows["value"].astype(np.float64)))
     if known.size:
         i = int(known[-1])

@@ -55,9 +55,9 @@ def parameters_figure(time_s: Floats, curves: Sequence[Curve], *, dark: bool = F
 
 def _panel(axes: Axes, look: Style, time_s: Floats, curve: Curve) -> None:
     name, unit, value, half = curve
-    at, (middle, low, high) = with_holes(time_s, [x[:, np.newaxis] for x in (value, value - half, value + half)])
-    axes.fill_between(at, low[:, 0], high[:, 0], color=look.run, alpha=0.22, linewidth=0, gid="bound")
-    axes.plot(at, middle[:, 0], color=look.run, linewidth=1.2, gid="value")
+    times, (middle, low, high) = with_holes(time_s, [x[:, np.newaxis] for x in (value, value - half, value + half)])
+    axes.fill_between(times, low[:, 0], high[:, 0], color=look.run, alpha=0.22, linewidth=0, gid="bound")
+    axes.plot(times, middle[:, 0], color=look.run, linewidth=1.2, gid="value")
     axes.set_title(
         shortened(labelled(name, unit), 60),
         loc="left",

@@ -7,20 +7,122 @@ from data is never read as markup.
 from __future__ import annotations
 
 import json
+import re
 import tempfile
+from dataclasses import dataclass, field
+from functools import cache
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 import typst
 
-from livebode.core import Document, Finding, Listing, OutputError, Paragraph, Part, Picture, PrintedTable, Section
+from livebode.core import (
+    Document,
+    Finding,
+    Listing,
+    OutputError,
+    Paragraph,
+    Part,
+    Picture,
+    PrintedTable,
+    Section,
+    needing,
+)
 from livebode.language import current_language, worded
 from livebode.pictures import LIGHT, columns
 from livebode_reports.html import readable
 from livebode_reports.page_style import TONE_COLOURS
-from livebode_reports.pdf_fonts import Letters, letters_of
 from livebode_reports.svg import pictures_svg
+
+with needing("Matplotlib", "plots", "a picture"):
+    import matplotlib
+    from matplotlib.ft2font import FT2Font
+
+_PLAIN, _FIXED = "DejaVu Sans", "DejaVu Sans Mono"
+_WIDE_FAMILIES = (
+    "Noto Sans CJK SC", "Noto Sans SC", "Source Han Sans SC", "Microsoft YaHei", "PingFang SC", "SimHei",
+    "WenQuanYi Micro Hei",
+)  # fmt: skip
+_WIDE = re.compile("[\u2e80-\u9fff\uf900-\ufaff\uff00-\uffef]")
+_EXAMPLES = "频率响应"
+_UNKNOWN = "\ufffd"
+
+
+@dataclass(frozen=True)
+class Letters:
+    """The fonts of a document, and the letters that they have.
+
+    Attributes
+    ----------
+    fonts, fixed_fonts
+        Families, in the order in which a letter is looked for.
+    folders
+        Where they are.
+    """
+
+    fonts: tuple[str, ...]
+    fixed_fonts: tuple[str, ...]
+    folders: tuple[str, ...]
+    _codes: frozenset[int] = field(repr=False)
+
+    def known(self, text: str) -> str:
+        """The text with the sign for an unknown letter where no font has it: PDF/A permits no gap."""
+        return "".join(c if ord(c) in self._codes or c in "\n\t" else _UNKNOWN for c in text)
+
+
+def letters_of(text: str) -> Letters:
+    """The fonts for this text.
+
+    Raises
+    ------
+    OutputError
+        If the language is Chinese and this computer has no font for that.
+    """
+    folder = Path(matplotlib.get_data_path()) / "fonts" / "ttf"
+    # A heading needs the bold letter, for which the other is not used.
+    codes = _codes(str(folder / "DejaVuSans.ttf")) & _codes(str(folder / "DejaVuSans-Bold.ttf"))
+    if not _WIDE.search(text):
+        return Letters((_PLAIN,), (_FIXED, _PLAIN), (str(folder),), codes)
+    font = _wide_font()
+    if font is None:
+        if current_language().code.startswith("zh"):
+            raise OutputError(
+                "no-font",
+                "this computer has no font with Chinese letters, and a PDF for archives contains its fonts",
+                "install one (Debian: fonts-wqy-microhei), or print the page from a browser",
+            )
+        return Letters((_PLAIN,), (_FIXED, _PLAIN), (str(folder),), codes)
+    family, path = font
+    fonts = (_PLAIN, family)
+    return Letters(fonts, (_FIXED, *fonts), (str(folder), str(Path(path).parent)), codes | _codes(path))
+
+
+@cache
+def _codes(path: str) -> frozenset[int]:
+    return frozenset(code for code in FT2Font(path).get_charmap() if code >= 32)
+
+
+@cache
+def _wide_font() -> tuple[str, str] | None:
+    """Family and file of a font of this computer with Chinese letters, a preferred one if there is any."""
+    from matplotlib.font_manager import findSystemFonts
+
+    fonts = [font for path in findSystemFonts() if (font := _family(path)) is not None]
+    ranks = {family: i for i, family in enumerate(_WIDE_FAMILIES)}
+    return min(fonts, key=lambda font: (ranks.get(font[0], len(ranks)), font[1]), default=None)
+
+
+def _family(path: str) -> tuple[str, str] | None:
+    try:
+        font = FT2Font(path)
+    except (OSError, RuntimeError):
+        return None
+    if not all(font.get_char_index(ord(letter)) for letter in _EXAMPLES):
+        return None
+    # A collection for several languages names the first of them.
+    return font.family_name.replace("CJK JP", "CJK SC"), path
+
 
 STANDARDS = ("a-2a", "ua-1")
 _SHORT, _LETTERS_MAX = 24, 60  # letters of a column, when the widths of a table's columns are shared out
@@ -67,13 +169,13 @@ def _compiled(contents: dict[str, bytes], letters: Letters, made_s: int) -> byte
         for file, data in contents.items():
             (folder / file).write_bytes(data)
         try:
-            found = compile_pdf(
+            document = compile_pdf(
                 folder / "main.typ", root=folder, font_paths=list(letters.folders), ignore_system_fonts=True,
                 sys_inputs=fonts, pdf_standards=list(STANDARDS), timestamp=made_s,
             )  # fmt: skip
         except typst.TypstError as error:
             raise _not_archivable(error) from None
-    return bytes(found)
+    return bytes(document)
 
 
 def _not_archivable(error: typst.TypstError) -> OutputError:

@@ -11,9 +11,9 @@ import numpy as np
 
 from livebode.analysis import (
     MARGINS,
-    Averaged,
     LoopReport,
     ModelTest,
+    RunMean,
     averaged,
     checked_loop,
     fit_averaged,
@@ -24,7 +24,7 @@ from livebode.core import LivebodeError, Responses, date_and_time
 from livebode.fitting import Fit
 from livebode.language import listed, tr, worded
 from livebode.records import RunRecord
-from livebode_reports.acceptance import Accepted, LimitEvidence, accepted
+from livebode_reports.acceptance import LimitEvidence, LimitResult, accepted
 from livebode_reports.events import EventSummary
 from livebode_reports.parameter_track import Track, tracks
 
@@ -105,7 +105,7 @@ class ReportData(RunData):
         The test of the model on independent data, if requested.
     """
 
-    of: Averaged
+    of: RunMean
     fit: Fit | None
     fit_words: str
     loop: LoopReport | None
@@ -119,7 +119,7 @@ class ReportData(RunData):
         return entry_title(self.run)
 
     @cached_property
-    def accepted(self) -> tuple[Accepted, ...]:
+    def accepted(self) -> tuple[LimitResult, ...]:
         """The results of the limits."""
         loop = LoopSection.model_validate(self.configuration.get("loop", {})).build(self.of.overview.lines.rate_hz)
         fits = [t for t in self.tracks.values() if t.model != MARGINS] if self.of.moved else []
@@ -169,21 +169,19 @@ def entry_title(run: RunRecord) -> str:
     return "" if run.selected is None else " ← ".join(run.selected)
 
 
-def _fit(configuration: dict[str, Any], of: Averaged) -> tuple[Fit | None, str]:
+def _fit(configuration: dict[str, Any], of: RunMean) -> tuple[Fit | None, str]:
     if "fit" not in configuration:
         return None, tr("No model was fitted: the run has no [fit] section. Use `livebode fit RUN` to fit one.")
     try:
-        found, words = fit_averaged(of, FitSection.model_validate(configuration["fit"]))
+        fit, words = fit_averaged(of, FitSection.model_validate(configuration["fit"]))
     except LivebodeError as error:
         return None, tr("No model was fitted: {why}.", why=worded(error.words))
-    if found.status == "ok":
-        return found, words
-    return None, tr("The fit to {what} was rejected: {why}.", what=worded(words), why=worded(found.sentence))
+    if fit.status == "ok":
+        return fit, words
+    return None, tr("The fit to {what} was rejected: {why}.", what=worded(words), why=worded(fit.sentence))
 
 
-def _loop(
-    run: RunRecord, configuration: dict[str, Any], of: Averaged, fit: Fit | None
-) -> tuple[LoopReport | None, str]:
+def _loop(run: RunRecord, configuration: dict[str, Any], of: RunMean, fit: Fit | None) -> tuple[LoopReport | None, str]:
     section = LoopSection.model_validate(configuration.get("loop", {}))
     described = section.build(of.overview.lines.rate_hz)
     if described.feedback is None:
@@ -191,11 +189,11 @@ def _loop(
     if fit is None:
         return None, tr("No margins: they need a fitted model, and there is none.")
     try:
-        found = loop_report(fit, "the mean", of.overview, described)
+        report = loop_report(fit, "the mean", of.overview, described)
         checked = checked_loop(run.path, section, run.selected)
     except LivebodeError as error:
         return None, tr("No margins: {why}.", why=worded(error.words))
-    return replace(found, responses=Responses.of(of.response), checked=checked), ""
+    return replace(report, responses=Responses.of(of.response), checked=checked), ""
 
 
 def recordings(source: dict[str, Any]) -> list[str]:
@@ -212,6 +210,6 @@ def written(path: Path) -> str:
         return ""
 
 
-def by_schedule(of: Averaged) -> bool:
+def by_schedule(of: RunMean) -> bool:
     """Whether the response can be plotted over the schedule."""
     return of.moved and bool(np.isfinite(of.overview.schedule).any())

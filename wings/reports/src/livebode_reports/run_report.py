@@ -12,9 +12,9 @@ from livebode.language import tr
 from livebode.plugins import loaded, named
 from livebode.records import RunRecord
 from livebode_reports import first_page, sections
-from livebode_reports.acceptance import Accepted
+from livebode_reports.acceptance import LimitResult
 from livebode_reports.limits import limits
-from livebode_reports.measured import details, distortion, how
+from livebode_reports.measurement_words import details, distortion, how
 from livebode_reports.report_data import ReportData, RunData, entry_title, read, recordings, written
 from livebode_reports.verdict import verdict
 from livebode_reports.wording import duration
@@ -41,7 +41,7 @@ def run_report(
     Parameters
     ----------
     directory
-        Run directory, in one piece or in segments, finished or not.
+        Run directory, finished or not.
     judged
         Test of its model on independent data.
     made
@@ -69,7 +69,7 @@ def accepted_report(
     header: ReportSection | None = None,
     appendix: bool = False,
     entry: str | None = None,
-) -> tuple[Document, tuple[Accepted, ...]]:
+) -> tuple[Document, tuple[LimitResult, ...]]:
     """The report of a run, or of an entry of a matrix run, as `run_report`; and the results of the limits."""
     of = read(directory, judged, header, entry)
     return report_of(of, made=made, appendix=appendix), of.accepted
@@ -77,9 +77,9 @@ def accepted_report(
 
 def report_of(of: ReportData, *, made: datetime, appendix: bool = False) -> Document:
     """The report of a run that was read; see `run_report`."""
-    found = [*(make(of) for make in _MEASURED), *_analyses(of.run), *(make(of) for make in _RECORDED)]
-    absent = tuple(Paragraph(reason) for reason in found if isinstance(reason, str))
-    there = [limits(of.accepted), *(section for section in found if isinstance(section, Section))]
+    parts = [*(make(of) for make in _MEASURED), *_analyses(of.run), *(make(of) for make in _RECORDED)]
+    absent = tuple(Paragraph(reason) for reason in parts if isinstance(reason, str))
+    there = [limits(of.accepted), *(section for section in parts if isinstance(section, Section))]
     findings, title = verdict(of), " · ".join(filter(None, (of.header.machine or of.title, of.entry)))
     return Document(
         kind=tr("Acceptance report") if of.accepted else tr("Measurement report"),
@@ -113,8 +113,8 @@ def not_judged(of: RunData) -> str:
 
 
 def _appendix(of: ReportData, absent: tuple[Paragraph, ...]) -> tuple[Section, ...]:
-    found = record_appendix(of)
-    return (*found, Section(tr("Not in this report"), absent)) if absent else found
+    sections = record_appendix(of)
+    return (*sections, Section(tr("Not in this report"), absent)) if absent else sections
 
 
 def record_appendix(of: RunData) -> tuple[Section, ...]:

@@ -30,7 +30,7 @@ _TRACES_MAX, _TRACED = 10, 500  # lines that are drawn as traces, and responses 
 
 def average(of: ReportData) -> Picture:
     """The mean with its bounds and the fitted model: the picture of the first page."""
-    one = of.of.response
+    mean = of.of.response
     names = (of.channels["input"], of.channels["output"]) if {"input", "output"} <= of.channels.keys() else None
     caption = tr(
         "Bars: {what}, with 95 % bounds. Light: range of 5–95 % of the single responses{thinned}.",
@@ -38,16 +38,16 @@ def average(of: ReportData) -> Picture:
     )  # fmt: skip
     if of.fit:
         caption += tr(" Dashed: the {model} model fitted to it.", model=worded(of.fit.model.name))
-    return Picture("bode", {"responses": of.of.overview, "mean": one, "names": names, "fitted": of.fit}, caption)
+    return Picture("bode", {"responses": of.of.overview, "mean": mean, "names": names, "fitted": of.fit}, caption)
 
 
 def response(of: ReportData) -> Section:
     """The mean at each line, with its bounds."""
-    one = of.of.response
-    frequency = one.lines.frequency_hz
+    mean = of.of.response
+    frequency = mean.lines.frequency_hz
     rows = [
         (number(f, "g"), *polar, number(c, ".4f") if isfinite(c) else "—", share(n, of.of.count))
-        for f, polar, c, n in zip(frequency, polar_rows(one, BOUND_95), one.coherence, of.of.valid)
+        for f, polar, c, n in zip(frequency, polar_rows(mean, BOUND_95), mean.coherence, of.of.valid)
     ]
     headings = ("Hz", f"dB{_re(of)}", "± dB", tr("degrees"), tr("± degrees"), tr("coherence γ²"), tr("valid"))
     return Section(tr("Frequency response"), (line_table(headings, rows),))
@@ -90,8 +90,8 @@ def parameters(of: ReportData) -> Section | str:
     note = tr("± covers 95 % if the model is complete.")
     if of.fit:
         note = tr("Of the mean: {bounds}.", bounds=worded(of.fit.about_bounds))
-    at = next((n.time_s for n in newest.values()), float("nan"))
-    late_at = tr("newest, at {time}", time=moment(at, 2)) if newest else tr("newest")
+    newest_s = next((n.time_s for n in newest.values()), float("nan"))
+    late_at = tr("newest, at {time}", time=moment(newest_s, 2)) if newest else tr("newest")
     headings = ("", tr("of the mean"), "±", late_at, "±", tr("unit"))
     parts.append(Paragraph(of.fit_words if of.fit is None else _fitted(of.fit, of.fit_words)))
     parts.append(PrintedTable(headings, tuple(rows), (1, 2, 3, 4), note))
@@ -99,10 +99,10 @@ def parameters(of: ReportData) -> Section | str:
     return Section(tr("Parameters"), tuple(parts))
 
 
-def _fitted(fit: Fit, what: str) -> str:
+def _fitted(fit: Fit, words: str) -> str:
     low, high = fit.band_hz
     values = {
-        "model": worded(fit.model.name), "what": worded(what), "lines": lines_of(fit.lines), "low": low,
+        "model": worded(fit.model.name), "what": worded(words), "lines": lines_of(fit.lines), "low": low,
         "high": high, "percent": 100 * fit.epsilon, "chi2": fit.chi2,
     }  # fmt: skip
     if isfinite(fit.chi2):
@@ -223,7 +223,7 @@ def versions(of: RunData) -> Section:
     return Section(tr("Versions"), (pairs(rows),))
 
 
-def _over_time(of: ReportData, track: Track, what: str) -> Picture:
+def _over_time(of: ReportData, track: Track, words: str) -> Picture:
     names = [name for name in track.values if np.isfinite(track.values[name]).any() and track.newest[name].sigma > 0]
     shown = [name for name in names if not name.endswith("_frequency")][:_PANELS]
     every = slice(None, None, -(-len(track.time_s) // _CURVES))
@@ -233,7 +233,7 @@ def _over_time(of: ReportData, track: Track, what: str) -> Picture:
         "curves": [(n, track.newest[n].unit, track.values[n][every], 1.96 * track.sigmas[n][every]) for n in shown],
     }
     thinned = _drawn(of, len(time_s))
-    caption = tr("{what} over time, with 95 % bounds{thinned}.", what=what, thinned=thinned)
+    caption = tr("{what} over time, with 95 % bounds{thinned}.", what=words, thinned=thinned)
     return Picture("parameters", data, caption)
 
 

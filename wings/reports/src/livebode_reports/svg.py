@@ -47,7 +47,7 @@ def themed_svg(svg: str, label: str) -> str:
         Text alternative for screen readers; already escaped.
     """
     svg = _SIZE.sub(rf'<svg class="figure" viewBox="\1" role="img" aria-label="{_literal(label)}">', svg, count=1)
-    return _STYLE.sub(lambda found: _themed(found.group()), svg)
+    return _STYLE.sub(lambda style: _themed(style.group()), svg)
 
 
 def _svg(figure: Figure, salt: str) -> str:
@@ -69,10 +69,10 @@ def variables(look: Style) -> str:
 
 def _pairs(look: Style) -> dict[str, str]:
     names = ("paper", "muted", "grid", "nothing")
-    found = dict(zip(LIGHT.traces, look.traces))
+    colours = dict(zip(LIGHT.traces, look.traces))
     # Last, so that a colour that a trace shares gets the dark colour of its main use.
     named = ("ink", "run", "newest", *names)
-    return found | {getattr(LIGHT, name): getattr(look, name) for name in named}
+    return colours | {getattr(LIGHT, name): getattr(look, name) for name in named}
 
 
 def _themed(declaration: str) -> str:

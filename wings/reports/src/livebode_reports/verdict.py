@@ -26,9 +26,9 @@ def verdict(of: ReportData) -> tuple[Finding, ...]:
     return by_urgency([*about_record(of), *_valid(of), *_fits(of), *_margins(of), *_validated(of)])
 
 
-def by_urgency(found: Iterable[Finding]) -> tuple[Finding, ...]:
+def by_urgency(findings: Iterable[Finding]) -> tuple[Finding, ...]:
     """The findings, the most urgent first."""
-    return tuple(sorted(found, key=lambda f: _URGENT[f.tone]))
+    return tuple(sorted(findings, key=lambda f: _URGENT[f.tone]))
 
 
 def about_record(of: RunData) -> list[Finding]:
@@ -37,9 +37,9 @@ def about_record(of: RunData) -> list[Finding]:
 
 
 def _record(of: RunData) -> list[Finding]:
-    found = []
+    findings = []
     if not of.run.finished:
-        found.append(
+        findings.append(
             Finding(
                 "check",
                 tr(
@@ -48,7 +48,7 @@ def _record(of: RunData) -> list[Finding]:
                 ),
             )
         )
-    found += [
+    findings += [
         Finding("check", tr("The signals are doubtful: {why}.", why=worded(event.words)))
         for event in of.event_summary.in_full
         if event.kind == "doubtful"
@@ -60,8 +60,8 @@ def _record(of: RunData) -> list[Finding]:
             "The record paused {n} times because the disk was full or failed.",
             lost,
         )
-        found.append(Finding("check", text))
-    return found
+        findings.append(Finding("check", text))
+    return findings
 
 
 def _ready(of: RunData) -> list[Finding]:
@@ -74,9 +74,9 @@ def _ready(of: RunData) -> list[Finding]:
 
 def _signals(of: RunData) -> list[Finding]:
     counts = of.run.summary.get("counts", {})
-    found = []
+    findings = []
     if counts.get("gaps"):
-        found.append(Finding("check", _gaps(counts["gaps"], counts.get("missing", 0))))
+        findings.append(Finding("check", _gaps(counts["gaps"], counts.get("missing", 0))))
     for key, words in (
         ("non-finite", tr("Not finite")), ("implausible", tr("Implausibly large")), ("spike", tr("Spikes")),
     ):  # fmt: skip
@@ -85,10 +85,10 @@ def _signals(of: RunData) -> list[Finding]:
                 "{what}: {n:,} sample of {all:,}.", "{what}: {n:,} samples of {all:,}.", counts[key],
                 what=words, all=of.samples,
             )  # fmt: skip
-            found.append(Finding("check", text))
-    if counts and not found:
-        found.append(Finding("ok", tr("The signals have no gap, no sample that is not finite, and no spike.")))
-    return found
+            findings.append(Finding("check", text))
+    if counts and not findings:
+        findings.append(Finding("ok", tr("The signals have no gap, no sample that is not finite, and no spike.")))
+    return findings
 
 
 def _gaps(gaps: int, missing: int) -> str:
@@ -111,11 +111,11 @@ def _valid(of: ReportData) -> list[Finding]:
         every, lines=lines_of(len(of.run.lines)), bad=bad, share=share(bad, every),
     )  # fmt: skip
     unexpected = bad - _after_starts(of.run)
-    found = [Finding("check" if unexpected > _INVALID_MANY * every else "ok", text)]
+    findings = [Finding("check" if unexpected > _INVALID_MANY * every else "ok", text)]
     if never := [f"{number(f, 'g')} Hz" for f, n in zip(of.run.lines.frequency_hz, of.of.valid) if not n]:
         lines = listed(never[:8]) + " …" * (len(never) > 8)
-        found.append(Finding("check", tr("Never valid: {lines}.", lines=lines)))
-    return found
+        findings.append(Finding("check", tr("Never valid: {lines}.", lines=lines)))
+    return findings
 
 
 def _after_starts(run: RunRecord) -> int:
@@ -136,7 +136,7 @@ def _fits(of: ReportData) -> list[Finding]:
             "one model of the mean is not valid: see the fits over the run.",
             **values,
         )
-    found = [Finding("check" if rough else "ok", text)]
+    findings = [Finding("check" if rough else "ok", text)]
     for track in of.tracks.values():
         if track.model != MARGINS and (why := failed(track)):
             every, not_ok = sum(track.statuses.values()), sum(why.values())
@@ -147,8 +147,8 @@ def _fits(of: ReportData) -> list[Finding]:
                 "Of {n:,} fits over the run, {rejected:,} were rejected: {reasons}.",
                 every, rejected=not_ok, reasons=reasons,
             )  # fmt: skip
-            found.append(Finding(tone, text))
-    return found
+            findings.append(Finding(tone, text))
+    return findings
 
 
 def _margins(of: ReportData) -> list[Finding]:

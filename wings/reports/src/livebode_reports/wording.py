@@ -41,9 +41,9 @@ def duration(of_s: float) -> str:
     """
     if of_s < 120:
         return f"{number(of_s, '.3g')} s"
-    minutes, rest = divmod(round(of_s), 60)
+    minutes, seconds = divmod(round(of_s), 60)
     hours, minutes = divmod(minutes, 60)
-    return f"{hours} h {minutes} min {rest} s" if hours else f"{minutes} min {rest} s"
+    return f"{hours} h {minutes} min {seconds} s" if hours else f"{minutes} min {seconds} s"
 
 
 def decibels(size: float) -> float:
@@ -92,9 +92,9 @@ def signed(number: str) -> str:
     return number if number.startswith(("-", "—")) else f"+{number}"
 
 
-def polar_rows(one: Response, c: float) -> list[tuple[str, str, str, str]]:
+def polar_rows(response: Response, c: float) -> list[tuple[str, str, str, str]]:
     """`polar` of each line with `Response.bound(c)`."""
-    return [polar(complex(v), float(r)) for v, r in zip(one.value, one.bound(c))]
+    return [polar(complex(v), float(r)) for v, r in zip(response.value, response.bound(c))]
 
 
 def pairs(rows: list[tuple[str, str]]) -> PrintedTable:

@@ -50,14 +50,14 @@ class LoopChange:
 
 def single_changes(section: LoopSection, rate_hz: float) -> list[LoopChange]:
     """All of a description, of signals that are recorded at this rate."""
-    found = list(_of_loop(section))
+    changes = list(_of_loop(section))
     for name in ("velocity", "position", "position_pd"):
         if getattr(section, name) is not None:
-            found += _of_controller(section, name)
-            found += _other_rates(section, name) if name != "velocity" else ()
+            changes += _of_controller(section, name)
+            changes += _other_rates(section, name) if name != "velocity" else ()
     if section.velocity is not None and section.position is None:
-        found += _position_left_out(section, rate_hz)
-    return found
+        changes += _position_left_out(section, rate_hz)
+    return changes
 
 
 def _of_loop(section: LoopSection) -> Iterator[LoopChange]:
@@ -112,7 +112,7 @@ def _of_controller(section: LoopSection, name: str) -> Iterator[LoopChange]:
 def _position_left_out(section: LoopSection, rate_hz: float) -> Iterator[LoopChange]:
     """A position loop at each rate that the rate of the velocity loop permits."""
     assert section.velocity is not None
-    for divider in (section.velocity.rate_divider * one for one in _DIVIDERS):
+    for divider in (section.velocity.rate_divider * factor for factor in _DIVIDERS):
 
         def with_position(gain: object, divider: int = divider) -> LoopSection:
             position = PIDSection(gain=float(gain), rate_hz=rate_hz / divider, rate_divider=divider)  # type: ignore[arg-type]
@@ -123,10 +123,10 @@ def _position_left_out(section: LoopSection, rate_hz: float) -> Iterator[LoopCha
 
 
 def _other_rates(section: LoopSection, name: str) -> Iterator[LoopChange]:
-    """The same controller at the other rates that the rate of the velocity loop permits."""
+    """A controller at the other rates that the rate of the velocity loop permits."""
     part = getattr(section, name)
     inner = section.velocity.rate_divider if name == "position" and section.velocity is not None else 1
-    for divider in (inner * one for one in _DIVIDERS):
+    for divider in (inner * factor for factor in _DIVIDERS):
 
         def at_rate(divider: object) -> LoopSection:
             assert isinstance(divider, int)

@@ -115,9 +115,9 @@ class LoopCheck:
         away = np.abs(self.residual.ratio - 1)
         if not np.isfinite(away).any():
             return np.nan, np.nan, np.nan
-        at = int(np.nanargmax(away))
-        bound = float(np.sqrt(-np.log(0.05)) * self.residual.ratio_sigma[at])
-        return float(away[at]), bound, float(self.residual.frequency_hz[at])
+        index = int(np.nanargmax(away))
+        bound = float(np.sqrt(-np.log(0.05)) * self.residual.ratio_sigma[index])
+        return float(away[index]), bound, float(self.residual.frequency_hz[index])
 
     @property
     def sentence(self) -> str:
@@ -148,7 +148,7 @@ class LoopCheck:
             "sentence": self.sentence,
             "p": self.p,
             "largest_difference": {"relative": away, "bound_95": bound, "frequency_hz": at_hz},
-            "explanations": [one.plain() for one in self.explanations],
+            "explanations": [explanation.plain() for explanation in self.explanations],
             "nearest": None if self.nearest is None else self.nearest.plain(),
             "windows": self.windows,
             "lines": [
@@ -186,7 +186,9 @@ def check_loop(signals: LoopSignals, section: LoopSection) -> LoopCheck:
         If its rates are not that of the signals.
     """
     described = section.described(signals.lines.rate_hz)
-    residual = min((signals.judge(described, phase) for phase in _phases(described)), key=lambda one: one.deviance)
+    residual = min(
+        (signals.judge(described, phase) for phase in _phases(described)), key=lambda residual: residual.deviance
+    )
     windows = round(signals.dof * (1 + 2 / 36) + 1)
     p = residual.p()
     changes = single_changes(section, signals.lines.rate_hz)
@@ -196,11 +198,11 @@ def check_loop(signals: LoopSignals, section: LoopSection) -> LoopCheck:
     if p >= ALPHA and not _much_better(words, residual):
         return LoopCheck(residual, p, (), None, False, windows)
     tried = words + [_explained(signals, change) for change in late]
-    tried.sort(key=lambda one: round(one.score, 6))  # two names of the same change: in the order of the list
-    fitting = [one for one in tried if one.p >= ALPHA]
+    tried.sort(key=lambda change: round(change.score, 6))  # two names of the same change: in the order of the list
+    fitting = [change for change in tried if change.p >= ALPHA]
     if not fitting and residual.share < HARMLESS:
         return LoopCheck(residual, p, (), None, True, windows)
-    fitting = fitting or [one for one in tried if one.residual.share < HARMLESS]
+    fitting = fitting or [change for change in tried if change.residual.share < HARMLESS]
     if not fitting:
         return LoopCheck(residual, p, (), tried[0], False, windows)
     best = fitting[0]
@@ -208,13 +210,13 @@ def check_loop(signals: LoopSignals, section: LoopSection) -> LoopCheck:
         return LoopCheck(residual, p, (), None, True, windows)
     # Where a harmless rest remains, all misfits are larger by what it adds.
     excess = max(1.0, best.residual.misfit / (2 * best.residual.value.size))
-    alike = tuple(one for one in fitting if one.score - best.score < _ALIKE * excess)
+    alike = tuple(change for change in fitting if change.score - best.score < _ALIKE * excess)
     return LoopCheck(residual, p, alike, None, False, windows)
 
 
 def _much_better(words: list[Explanation], described: LoopResidual) -> bool:
     """Whether one of these words explains the signals so much better that it is not by chance."""
-    best = min((one.residual.deviance for one in words), default=np.inf)
+    best = min((word.residual.deviance for word in words), default=np.inf)
     return bool(described.deviance - best > 2 * np.log(len(words) / ALPHA))
 
 
@@ -236,14 +238,17 @@ def _explained(signals: LoopSignals, change: LoopChange) -> Explanation:
         return lambda value: signals.judge(loop(value), phase)
 
     if not change.starts:
-        one = loop(change.word)
-        residual = min((signals.judge(one, phase) for phase in _phases(one)), key=lambda found: found.deviance)
+        changed_loop = loop(change.word)
+        residual = min(
+            (signals.judge(changed_loop, phase) for phase in _phases(changed_loop)),
+            key=lambda residual: residual.deviance,
+        )
         return Explanation(change, change.word, None, residual, residual.p())
     fits = []
     for start in change.starts:
         # The number hardly depends on the phase: it is fitted with the first one, and again with the best.
         value, _, _ = _fitted(judged(0), start, change.least)
-        phase = min(_phases(loop(start)), key=lambda one: judged(one)(value).deviance)
+        phase = min(_phases(loop(start)), key=lambda phase: judged(phase)(value).deviance)
         fits.append(_fitted(judged(phase), value, change.least))
     value, sigma, residual = min(fits, key=lambda fit: fit[2].deviance)
     return Explanation(change, value, _Z95 * sigma, residual, residual.p(fitted=1))
@@ -270,14 +275,14 @@ def _fitted(judged: Callable[[float], LoopResidual], start: float, least: float)
         move = -float(np.sum(weight * (np.conj(slope) * residual.value).real)) / curvature
         for _ in range(12):
             trial = max(value + move, least)
-            found = judged(trial)
-            if found.misfit < residual.misfit:
+            trial_residual = judged(trial)
+            if trial_residual.misfit < residual.misfit:
                 break
             move /= 2
         else:
             break
         done = abs(trial - value) < 1e-3 * sigma
-        value, residual = trial, found
+        value, residual = trial, trial_residual
         if done:
             break
     return value, sigma, residual

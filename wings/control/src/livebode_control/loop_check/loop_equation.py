@@ -77,15 +77,15 @@ class LoopSignals:
         period = lines.window
         if starts is None:
             starts = period * np.arange(len(block) // period - 1)
-            what, remedy = f"fewer than {WINDOWS_MIN + 1} periods of {period}", "record longer"
+            cause, remedy = f"fewer than {WINDOWS_MIN + 1} periods of {period}", "record longer"
         else:
-            what = f"too few: {len(starts)} windows of two settled periods, and {WINDOWS_MIN} are needed"
+            cause = f"too few: {len(starts)} windows of two settled periods, and {WINDOWS_MIN} are needed"
             remedy = "record more repetitions, or longer experiments"
         count = len(starts)
         if count < WINDOWS_MIN:
             raise SignalError(
                 "too-short",
-                f"{len(block)} samples in a row without a gap are {what}",
+                f"{len(block)} samples in a row without a gap are {cause}",
                 remedy,
                 samples=len(block),
                 limit=(WINDOWS_MIN + 1) * period,
@@ -134,14 +134,14 @@ class LoopSignals:
     def _moments_with(self, samples: tuple[HeldSamples, ...], phase: int) -> tuple[Complex, Complex]:
         """Mean and covariance of the three signals and of the images of slower controllers."""
         if (samples, phase) not in self._with_images:
-            images = np.stack([one.images(self.output, self.lines.rate_hz, phase) for one in samples])
+            images = np.stack([sample.images(self.output, self.lines.rate_hz, phase) for sample in samples])
             about = _spectra(images, self.lines, self._starts) * self.instrument[:, np.newaxis]
             self._with_images[samples, phase] = _moments(np.concatenate([self._spectra, about], axis=1))
         return self._with_images[samples, phase]
 
 
 def _spectra(signals: Floats, lines: Lines, starts: NDArray[np.intp]) -> Complex:
-    """Of windows of two periods, (windows, signals, lines)."""
+    """Spectra of windows of two periods, (windows, signals, lines)."""
     length = 2 * lines.window
     hann = 1 - np.cos(2 * np.pi * np.arange(length) / length)
     bins = 2 * np.array(lines.bins)

@@ -38,11 +38,11 @@ class HeldSamples:
         if self.position != "output":
             read = (np.cumsum(output) - (output / 2 if self.position == "trapezoidal" else 0.0)) / rate_hz
         many = self.rate_divider
-        at = np.arange(many - 1, read.size)
+        index = np.arange(many - 1, read.size)
         total = np.cumsum(np.concatenate([[0.0], read - read.mean()]))
-        mean = (total[at + 1] - total[at + 1 - many]) / many + read.mean()
+        mean = (total[index + 1] - total[index + 1 - many]) / many + read.mean()
         # The first ticks of the first window have no weight.
-        return np.concatenate([np.zeros(many - 1), read[at - (at - phase) % many] - mean])
+        return np.concatenate([np.zeros(many - 1), read[index - (index - phase) % many] - mean])
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class HeldPath:
 
 
 def held_paths(feedback: Model | None) -> tuple[HeldPath, ...]:
-    """Of a feedback with controllers at lower rates; none if all run at that of the recording, or interpolate.
+    """Held paths of a feedback with controllers at lower rates; none if all run at the rate of the recording.
 
     A position controller whose ticks are not among those of its velocity controller has no path here.
     """

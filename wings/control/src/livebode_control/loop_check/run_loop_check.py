@@ -98,17 +98,17 @@ def check_controllers_of_run(
             path=str(directory),
         )
     _check_decentral(section, roles["input"])
-    found = {}
-    for one in section.controllers:
-        at = roles["input"].index(one.input)
-        channels = {"output": one.output, "input": one.input, "excitation": roles["excitation"][at]}
-        own = section.of_controller(one.output, one.input)
-        found[f"{one.output}/{one.input}"] = _checked(run, own, channels)
-    return found, section
+    checks = {}
+    for controller in section.controllers:
+        index = roles["input"].index(controller.input)
+        channels = {"output": controller.output, "input": controller.input, "excitation": roles["excitation"][index]}
+        own = section.of_controller(controller.output, controller.input)
+        checks[f"{controller.output}/{controller.input}"] = _checked(run, own, channels)
+    return checks, section
 
 
 def _check_decentral(section: LoopSection, inputs: list[str]) -> None:
-    names = [one.input for one in section.controllers]
+    names = [controller.input for controller in section.controllers]
     if not names:
         raise UsageError(
             "missing",
@@ -194,16 +194,16 @@ def settled_starts(block: Block, period: int, dwell: int, settle: int, start: in
     return np.asarray(starts[(starts >= 0) & (starts + 2 * period <= len(block))], dtype=np.intp)
 
 
-def store_loop_check(directory: Path, found: LoopCheck, section: LoopSection) -> Path:
+def store_loop_check(directory: Path, check: LoopCheck, section: LoopSection) -> Path:
     """Write the result and the description that it belongs to into a directory."""
-    return write_loop_check(directory, {**found.plain(), "loop": section.model_dump(mode="json")})
+    return write_loop_check(directory, {**check.plain(), "loop": section.model_dump(mode="json")})
 
 
-def store_controller_checks(directory: Path, found: dict[str, LoopCheck], section: LoopSection) -> Path:
+def store_controller_checks(directory: Path, checks: dict[str, LoopCheck], section: LoopSection) -> Path:
     """Write the results for the controllers of a matrix, and the description that they belong to."""
-    worst = max(found.values(), key=lambda one: _VERDICTS.index(one.verdict))
+    worst = max(checks.values(), key=lambda check: _VERDICTS.index(check.verdict))
     whole = {"verdict": worst.verdict, "sentence": worst.sentence}
-    each = {name: one.plain() for name, one in found.items()}
+    each = {name: check.plain() for name, check in checks.items()}
     return write_loop_check(directory, {**whole, "controllers": each, "loop": section.model_dump(mode="json")})
 
 
@@ -227,11 +227,11 @@ def _of_logs(words: dict[str, Any], names: list[str], where: str) -> Block:
         used |= _without_matrix(used)
     axis = Axis.of(used, where)
     given, ready = axis.source, axis.ready
-    found = []
+    stretches = []
     for log in given.logs:
         opened = open_log(log, rate_hz=given.rate_hz, time=given.time, dbc=given.dbc, channels=names)
-        found.append(clean_stretch(opened, names, ready if ready and opened.has(ready.channel) else None)[0])
-    return max(found, key=len)
+        stretches.append(clean_stretch(opened, names, ready if ready and opened.has(ready.channel) else None)[0])
+    return max(stretches, key=len)
 
 
 def _without_matrix(words: dict[str, Any]) -> dict[str, Any]:
@@ -253,9 +253,9 @@ def _recorded(run: RunRecord, names: list[str]) -> Block | None:
     follows = np.concatenate([[False], np.diff(number) == 1]) & clean
     starts = np.flatnonzero(~follows)
     lengths = np.diff(np.append(starts, number.size))
-    at = int(np.argmax(lengths))
-    first = int(starts[at]) + (0 if clean[starts[at]] else 1)
-    stretch = data[:, first : int(starts[at] + lengths[at])]
+    longest = int(np.argmax(lengths))
+    first = int(starts[longest]) + (0 if clean[starts[longest]] else 1)
+    stretch = data[:, first : int(starts[longest] + lengths[longest])]
     begin = int(number[first])
     return Block(stretch, tuple(Channel(name) for name in names), float(run.found["rate_hz"]), start=begin)
 

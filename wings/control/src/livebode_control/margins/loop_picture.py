@@ -40,21 +40,21 @@ class LoopCurves(Protocol):
 
 
 def save_loop_picture(
-    found: LoopCurves, directory: str | PathLike[str], *, title: str = "", dark: bool = False
+    curves: LoopCurves, directory: str | PathLike[str], *, title: str = "", dark: bool = False
 ) -> Path:
     """Write margins.png to an existing directory."""
-    return save(loop_figure(found, title=title, dark=dark), Path(directory) / "margins.png", style(dark))
+    return save(loop_figure(curves, title=title, dark=dark), Path(directory) / "margins.png", style(dark))
 
 
-def loop_figure(found: LoopCurves, *, title: str = "", dark: bool = False, width_in: float = 12.0) -> Figure:
+def loop_figure(curves: LoopCurves, *, title: str = "", dark: bool = False, width_in: float = 12.0) -> Figure:
     """|L| and its phase over frequency beside the Nyquist plot, from the fit with a 95 % band.
 
     Dots are the measured lines, F·G, with 95 % bounds. Open diamonds mark |L| = 1 and squares negative L, if a margin
     was computed there. Beyond the lines the curve is dashed: it is from the model only.
     """
     look = style(dark)
-    f = np.geomspace(found.fit.band_hz[0] / 4, found.loop.rate_hz / 2, _POINTS)
-    value, low, high = _curves(found, f)
+    f = np.geomspace(curves.fit.band_hz[0] / 4, curves.loop.rate_hz / 2, _POINTS)
+    value, low, high = _curves(curves, f)
     with drawing(look):
         figure = new_figure(width_in, 6.4 * (0.5 + width_in / 24))
         height = figure.get_size_inches()[1]
@@ -62,26 +62,26 @@ def loop_figure(found: LoopCurves, *, title: str = "", dark: bool = False, width
             2, 2, width_ratios=[1.25, 1], height_ratios=[3, 2], left=0.78 / width_in, right=0.985,
             top=1 - 1.15 / height, bottom=0.55 / height, hspace=0.09, wspace=0.17,
         )  # fmt: skip
-        heading(figure, look, title or tr("Loop"), _facts(found), 0.78 / width_in)
+        heading(figure, look, title or tr("Loop"), _facts(curves), 0.78 / width_in)
         magnitude = figure.add_subplot(grid[0, 0])
         phase = figure.add_subplot(grid[1, 0], sharex=magnitude)
         nyquist = figure.add_subplot(grid[:, 1])
-        _bode(magnitude, phase, look, found, f, (value, low, high))
+        _bode(magnitude, phase, look, curves, f, (value, low, high))
         for axes in (magnitude, phase):
             axes.yaxis.set_label_coords(-0.98 / width_in, 0.5)
-        _nyquist(nyquist, look, found, f, value)
+        _nyquist(nyquist, look, curves, f, value)
         _legend(figure, look, 0.78 / width_in)
     return figure
 
 
-def _curves(found: LoopCurves, f: Floats) -> tuple[Complex, tuple[Floats, Floats], tuple[Floats, Floats]]:
+def _curves(loop_curves: LoopCurves, f: Floats) -> tuple[Complex, tuple[Floats, Floats], tuple[Floats, Floats]]:
     """L of the fit, and (dB, degrees) at both ends of its 95 % band."""
-    values = found.fit.parameters.value[:1]
-    covariance = found.fit.parameters.covariance[0]
+    values = loop_curves.fit.parameters.value[:1]
+    covariance = loop_curves.fit.parameters.covariance[0]
     size, turned = np.linalg.eigh(covariance)
     drawn = np.random.default_rng(0).standard_normal((_DRAWS, len(size))) * np.sqrt(size.clip(0)) @ turned.T
-    value = found.loop.at(values, f)[0]
-    around = found.loop.at(values + drawn, f) / value
+    value = loop_curves.loop.at(values, f)[0]
+    around = loop_curves.loop.at(values + drawn, f) / value
     db = 1.96 * np.std(20 * np.log10(np.abs(around)), axis=0)
     deg = 1.96 * np.std(np.degrees(np.angle(around)), axis=0)
     middle_db, middle_deg = 20 * np.log10(np.abs(value)), _degrees(value)
@@ -95,34 +95,34 @@ def _degrees(value: Complex) -> Floats:
 
 
 def _bode(
-    magnitude: Axes, phase: Axes, look: Style, found: LoopCurves, f: Floats, curves: tuple[Complex, Any, Any]
+    magnitude: Axes, phase: Axes, look: Style, loop_curves: LoopCurves, f: Floats, curves: tuple[Complex, Any, Any]
 ) -> None:
     from livebode.pictures import frequency_axis
 
     value, low, high = curves
-    inside = (f >= found.fit.band_hz[0]) & (f <= found.fit.band_hz[1])
+    inside = (f >= loop_curves.fit.band_hz[0]) & (f <= loop_curves.fit.band_hz[1])
     for axes, middle, i in ((magnitude, 20 * np.log10(np.abs(value)), 0), (phase, _degrees(value), 1)):
         axes.fill_between(f, low[i], high[i], color=look.run, alpha=0.25, linewidth=0, zorder=2)
         axes.plot(f, middle, color=look.run, linewidth=1.0, dashes=(4, 2), zorder=3)
         axes.plot(f[inside], middle[inside], color=look.run, linewidth=1.6, zorder=3)
         plain(axes)
-    at, measured, bound = _measured(found)
+    measured_hz, measured, bound = _measured(loop_curves)
     size = np.abs(measured)
     error = np.clip(bound / size, 0, 0.999)
     db = 20 * np.log10(np.stack([1 - error, 1 + error])) + 20 * np.log10(size)
-    magnitude.vlines(at, *db, color=look.newest, linewidth=1.4, zorder=4)
-    magnitude.plot(at, 20 * np.log10(size), "o", markersize=3.5, color=look.newest, zorder=5)
-    near = np.interp(at, f, _degrees(value))
+    magnitude.vlines(measured_hz, *db, color=look.newest, linewidth=1.4, zorder=4)
+    magnitude.plot(measured_hz, 20 * np.log10(size), "o", markersize=3.5, color=look.newest, zorder=5)
+    near = np.interp(measured_hz, f, _degrees(value))
     turned = np.degrees(np.angle(measured))
     turned += 360 * np.rint((near - turned) / 360)
     half = np.degrees(np.arcsin(error))
-    phase.vlines(at, turned - half, turned + half, color=look.newest, linewidth=1.4, zorder=4)
-    phase.plot(at, turned, "o", markersize=3.5, color=look.newest, zorder=5)
+    phase.vlines(measured_hz, turned - half, turned + half, color=look.newest, linewidth=1.4, zorder=4)
+    phase.plot(measured_hz, turned, "o", markersize=3.5, color=look.newest, zorder=5)
     magnitude.axhline(0, color=look.muted, linewidth=0.9)
     for k in range(int(np.min(_degrees(value)) // 360) - 1, 2):
         phase.axhline(-180 + 360 * k, color=look.muted, linewidth=0.9)
-    for marker, where in _marked(found):
-        level = found.loop.at(found.fit.parameters.value[:1], where)[0]
+    for marker, where in _marked(loop_curves):
+        level = loop_curves.loop.at(loop_curves.fit.parameters.value[:1], where)[0]
         magnitude.plot(where, 20 * np.log10(np.abs(level)), marker, markersize=9, markerfacecolor="none",
                        markeredgecolor=look.ink, markeredgewidth=1.6, zorder=6)  # fmt: skip
         phase.plot(where, np.interp(where, f, _degrees(value)), marker, markersize=9, markerfacecolor="none",
@@ -145,31 +145,31 @@ def round_numbers(low_hz: float, high_hz: float) -> Floats:
     return np.concatenate([[low_hz], inside, [high_hz]])
 
 
-def _nyquist(axes: Axes, look: Style, found: LoopCurves, f: Floats, value: Complex) -> None:
+def _nyquist(axes: Axes, look: Style, curves: LoopCurves, f: Floats, value: Complex) -> None:
     """The curve near −1, the circle that touches it, and the measured lines."""
     from matplotlib.patches import Circle
 
-    inside = (f >= found.fit.band_hz[0]) & (f <= found.fit.band_hz[1])
+    inside = (f >= curves.fit.band_hz[0]) & (f <= curves.fit.band_hz[1])
     axes.axhline(0, color=look.muted, linewidth=0.8)
     axes.axvline(0, color=look.muted, linewidth=0.8)
     axes.add_patch(Circle((0, 0), 1.0, fill=False, edgecolor=look.muted, linewidth=0.9, linestyle=":"))
     axes.plot(value.real, value.imag, color=look.run, linewidth=1.0, dashes=(4, 2), zorder=3)
     axes.plot(np.where(inside, value.real, np.nan), value.imag, color=look.run, linewidth=1.6, zorder=3)
-    _, measured, bound = _measured(found)
+    _, measured, bound = _measured(curves)
     for point, radius in zip(measured, bound):
         axes.add_patch(
             Circle((point.real, point.imag), radius, facecolor=look.newest, alpha=0.3, linewidth=0, zorder=3)
         )
     axes.plot(measured.real, measured.imag, "o", markersize=3.5, color=look.newest, zorder=5)
     axes.plot([-1], [0], "+", markersize=12, markeredgewidth=2.0, color=look.ink, zorder=6)
-    ms = found.margins.of("peak_sensitivity")[0]
+    ms = curves.margins.of("peak_sensitivity")[0]
     if np.isfinite(ms):
         axes.add_patch(Circle((-1, 0), 1 / ms, fill=False, edgecolor=look.ink, linewidth=1.2, zorder=4))
         axes.annotate(
             f"Ms = {number(ms, '.3g')}", (-1, 1 / ms), (0, 5), textcoords="offset points", ha="center", color=look.ink
         )
-    for marker, where in _marked(found):
-        level = found.loop.at(found.fit.parameters.value[:1], where)[0]
+    for marker, where in _marked(curves):
+        level = curves.loop.at(curves.fit.parameters.value[:1], where)[0]
         axes.plot(level.real, level.imag, marker, markersize=9, markerfacecolor="none", markeredgecolor=look.ink,
                   markeredgewidth=1.6, zorder=6)  # fmt: skip
     axes.set_xlim(-_REACH, _REACH * 0.75)
@@ -180,27 +180,31 @@ def _nyquist(axes: Axes, look: Style, found: LoopCurves, f: Floats, value: Compl
     plain(axes)
 
 
-def _measured(found: LoopCurves) -> tuple[Floats, Complex, Floats]:
+def _measured(curves: LoopCurves) -> tuple[Floats, Complex, Floats]:
     """Frequency, F·G and its 95 % bound at the valid lines."""
-    one = found.responses
-    use = one.valid[0]
-    f = one.lines.frequency_hz[use]
-    behind = found.loop.loop.feedback_at(f)
-    return f, one.value[0, use] * behind, np.nan_to_num(one.bound(np.sqrt(np.log(20)))[0, use]) * np.abs(behind)
+    responses = curves.responses
+    use = responses.valid[0]
+    f = responses.lines.frequency_hz[use]
+    behind = curves.loop.loop.feedback_at(f)
+    return (
+        f,
+        responses.value[0, use] * behind,
+        np.nan_to_num(responses.bound(np.sqrt(np.log(20)))[0, use]) * np.abs(behind),
+    )
 
 
-def _marked(found: LoopCurves) -> list[tuple[str, Floats]]:
+def _marked(curves: LoopCurves) -> list[tuple[str, Floats]]:
     """Mark the frequencies of the margins: |L| = 1 (diamonds), L negative (squares)."""
-    f = dict(zip(found.margins.names, found.margins.frequency_hz[0]))
+    f = dict(zip(curves.margins.names, curves.margins.frequency_hz[0]))
     kinds = (("D", ("phase_margin", "delay_margin")), ("s", ("gain_margin", "gain_reduction")))
-    low = found.fit.band_hz[0] / 4
+    low = curves.fit.band_hz[0] / 4
     return [(m, np.unique([f[n] for n in names if np.isfinite(f[n]) and f[n] >= low])) for m, names in kinds]
 
 
-def _facts(found: LoopCurves) -> str:
-    bound = found.margins.bound()[0]
+def _facts(curves: LoopCurves) -> str:
+    bound = curves.margins.bound()[0]
     words = [
-        f"{label} {number(found.margins.value[0, i], '.3g')} ± {number(bound[i], '.2g')}{unit}"
+        f"{label} {number(curves.margins.value[0, i], '.3g')} ± {number(bound[i], '.2g')}{unit}"
         for label, name, unit in (
             (tr("gain margin"), "gain_margin", " dB"),
             (tr("phase margin"), "phase_margin", "°"),
@@ -208,9 +212,9 @@ def _facts(found: LoopCurves) -> str:
             ("Ms", "peak_sensitivity", ""),
             (tr("bandwidth"), "bandwidth", " Hz"),
         )
-        if np.isfinite(found.margins.value[0, (i := found.margins.index(name))])
+        if np.isfinite(curves.margins.value[0, (i := curves.margins.index(name))])
     ]
-    return " · ".join(words) or worded(str(found.margins.status[0]))
+    return " · ".join(words) or worded(str(curves.margins.status[0]))
 
 
 def _legend(figure: Figure, look: Style, left: float) -> None:

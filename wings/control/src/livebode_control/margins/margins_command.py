@@ -24,9 +24,6 @@ def margins_command(
         typer.Option(metavar="AXIS.toml", help="Read \\[loop] and \\[fit] from this file instead of the run."),
     ] = None,
     model: Annotated[str | None, typer.Option(help="rigid, two-mass, … \\[default: the run's \\[fit]]")] = None,
-    radius: Annotated[
-        float | None, typer.Option(metavar="M", help="Radius of the pulley, for a load in linear motion.")
-    ] = None,
     entry: Entry = None,
     max_sensitivity: Annotated[float, typer.Option(help="Largest permitted peak sensitivity Ms.")] = 2.0,
     as_json: Json = False,
@@ -41,38 +38,37 @@ def margins_command(
     from livebode_control.margins.loop_margins import margins_of_run
     from livebode_control.margins.loop_picture import save_loop_picture
 
-    given = {k: v for k, v in {"model": model, "radius_m": radius}.items() if v is not None}
-    section = FitSection.model_validate(given) if given else None
-    found = margins_of_run(directory, section, None if axis is None else Axis.read(axis), max_sensitivity, entry)
+    section = None if model is None else FitSection(model=model)
+    loop = margins_of_run(directory, section, None if axis is None else Axis.read(axis), max_sensitivity, entry)
     into = results_directory(directory)
     if can_draw():
         with writing(into, RecordError):
-            save_loop_picture(found.report, into, title=directory.name)
+            save_loop_picture(loop.report, into, title=directory.name)
     if as_json:
-        print(to_json(found.plain()))
+        print(to_json(loop.plain()))
         return
-    show_loop(found)
+    show_loop(loop)
     print(f"\n{into / 'margins.png'}" if can_draw() else "")
     tell_how_to_draw()
 
 
 def show_loop(of: LoopMargins) -> None:
     """Print the margins with bounds and marks, and the proposals."""
-    found = of.report
-    low, high = found.fit.band_hz
-    print(f"loop around the {found.fit.model.name} model, {found.of}; lines {low:g} … {high:g} Hz")
-    print(f"  {found.checked.sentence}")
-    if not found.margins.ok[0]:
-        print(f"  no margins: {found.message}")
+    report = of.report
+    low, high = report.fit.band_hz
+    print(f"loop around the {report.fit.model.name} model, {report.of}; lines {low:g} … {high:g} Hz")
+    print(f"  {report.checked.sentence}")
+    if not report.margins.ok[0]:
+        print(f"  no margins: {report.message}")
     else:
-        _show_margins(found.margins)
-        if found.fit.taken or not found.fit.complete:
-            print(f"  {found.fit.about_bounds}")
-    size, bound, at_hz = found.at_lines
+        _show_margins(report.margins)
+        if report.fit.taken or not report.fit.complete:
+            print(f"  {report.fit.about_bounds}")
+    size, bound, at_hz = report.at_lines
     print(f"  above {high:g} Hz nothing is promised: a mode that the model does not have can reduce the margins")
     print(f"  lines alone, without the model: Ms is at least {size:.3g} ± {bound:.2g} (at {at_hz:g} Hz)")
-    if len(found.places) > 1:
-        print(f"worst of {len(found.places)} fits, at 12 places and of the whole run: {_in_short(of.tuning.before)}")
+    if len(report.places) > 1:
+        print(f"worst of {len(report.places)} fits, at 12 places and of the whole run: {_in_short(of.tuning.before)}")
     _show_tuning(of.tuning)
 
 
@@ -93,9 +89,9 @@ def _show_margins(margins: Margins) -> None:
     print("  ± is 1.96 sigma from the covariance of the fit; no line checks the model where it is EXTRAPOLATED")
 
 
-def _show_tuning(found: Tuning) -> None:
-    print(f"{found.verdict}: {found.sentence}")
-    for proposal in found.proposals:
+def _show_tuning(tuning: Tuning) -> None:
+    print(f"{tuning.verdict}: {tuning.sentence}")
+    for proposal in tuning.proposals:
         _show_proposal(proposal)
 
 

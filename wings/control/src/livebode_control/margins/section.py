@@ -13,26 +13,26 @@ from livebode_control.margins.loop_margins import filter_of
 
 def loop_section(loop: LoopReport, over_time: Sequence[Part]) -> Section:
     """The margins of the loop, with bounds and frequencies, and what shows them over time."""
-    found = loop.margins
-    bound = found.bound()[0]
+    margins = loop.margins
+    bound = margins.bound()[0]
     rows = []
-    for i, (name, unit) in enumerate(zip(found.names, found.units)):
-        value, at = found.value[0, i], found.frequency_hz[0, i]
-        if isnan(at):
+    for i, (name, unit) in enumerate(zip(margins.names, margins.units)):
+        value, at_hz = margins.value[0, i], margins.frequency_hz[0, i]
+        if isnan(at_hz):
             size = tr("any amount") if isinf(value) else tr("none")
             rows.append((worded(MARGIN_WORDS[name]), size, "", worded(unit), "", tr("no crossing")))
             continue
-        between = found.place[0, i] == "interpolated"
+        between = margins.place[0, i] == "interpolated"
         mark = tr("between the lines") if between else tr("EXTRAPOLATED: no line checks it")
         sizes = with_bound(value, bound[i])
-        rows.append((worded(MARGIN_WORDS[name]), *sizes, worded(unit), number(at, ".4g"), mark))
+        rows.append((worded(MARGIN_WORDS[name]), *sizes, worded(unit), number(at_hz, ".4g"), mark))
     headings = (tr("margin"), tr("value"), "±", tr("unit"), tr("at Hz"), tr("range"))
     table = PrintedTable(headings, tuple(rows), (1, 2, 4), _about_margins(loop))
     caption = tr(
         "Open loop L of the fit with its 95 % band, and the measured lines. Right: near −1, with the circle of Ms."
     )
     picture = Picture(
-        "livebode_control.margins.loop_picture:loop_figure", {"found": loop, "title": tr("Open loop")}, caption
+        "livebode_control.margins.loop_picture:loop_figure", {"curves": loop, "title": tr("Open loop")}, caption
     )
     return Section(tr("Margins of the loop"), (table, picture, *over_time))
 
@@ -51,7 +51,7 @@ def _about_margins(loop: LoopReport) -> str:
 def _about_description(loop: LoopReport) -> str:
     """Whether the margins are of a loop whose description was checked."""
     if loop.checked.verdict == "not checked":
-        return tr("The description of the controllers was not compared with the signals (livebode check-loop).")
+        return tr("The description of the controllers was not compared with the signals (livebode validate --loop).")
     if loop.checked.verdict == "as described":
         return tr("The description of the controllers was compared with the signals: the loop is as described.")
     return tr(

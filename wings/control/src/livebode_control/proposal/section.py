@@ -16,20 +16,20 @@ from livebode_control.tuning.reach import PromiseReach
 def proposed_controller(directory: Path, entry: str | None = None) -> Section | str:
     """The newest proposal of `livebode tune`, which nobody may have entered yet."""
     try:
-        found = newest_proposal(directory, entry)
+        proposal = newest_proposal(directory, entry)
     except LivebodeError as error:
         return tr("No controller is proposed: {why}.", why=worded(error.words))
-    if found is None:
+    if proposal is None:
         return tr("No controller was proposed. Use `livebode tune RUN` to propose one.")
     caption = tr("Dashed: as described. Solid: proposed. Bands: every plant and place within the 95 % bounds.")
     return Section(
         tr("Proposed controller"),
         (
-            _margins(found),
-            Listing(gains_toml(found.feedback.controller)),
-            *([_filters(found)] if found.feedback.notches or found.feedback.low_passes else []),
-            Paragraph(_reach(found.reach)),
-            Picture("livebode_control.proposal.tuning_picture:folded_tuning_figure", {"found": found}, caption),
+            _margins(proposal),
+            Listing(gains_toml(proposal.feedback.controller)),
+            *([_filters(proposal)] if proposal.feedback.notches or proposal.feedback.low_passes else []),
+            Paragraph(_reach(proposal.reach)),
+            Picture("livebode_control.proposal.tuning_picture:folded_tuning_figure", {"proposal": proposal}, caption),
         ),
     )
 
@@ -50,7 +50,7 @@ def _reach(reach: PromiseReach) -> str:
     return f"{words} " + tr("The lines show a mode near {hz} Hz.", hz=number(reach.shown_hz, ".4g"))
 
 
-def _margins(found: ControllerProposal) -> PrintedTable:
+def _margins(proposal: ControllerProposal) -> PrintedTable:
     rows = []
     for name, field, unit in (
         (tr("bandwidth"), "bandwidth_hz", "Hz"),
@@ -59,7 +59,7 @@ def _margins(found: ControllerProposal) -> PrintedTable:
         (worded("peak sensitivity Ms"), "max_sensitivity", ""),
         (tr("disk margin"), "disk_margin", ""),
     ):
-        sides = (found.before, found.after, found.promised)
+        sides = (proposal.before, proposal.after, proposal.promised)
         rows.append((name, *(_number(getattr(side, field, None)) for side in sides), unit))
     headings = (tr("margin"), tr("as described"), tr("proposed"), tr("promised"), tr("unit"))
     note = tr(
@@ -75,11 +75,11 @@ def _number(value: float | None) -> str:
     return number(value, ".4g") if isfinite(value) else tr("any amount")
 
 
-def _filters(found: ControllerProposal) -> PrintedTable:
+def _filters(proposal: ControllerProposal) -> PrintedTable:
     notches = [
         (tr("notch"), number(f, ".4g"), number(depth, ".3g"), number(damping, ".3g"))
-        for f, depth, damping in found.feedback.notches
+        for f, depth, damping in proposal.feedback.notches
     ]
-    corners = [(tr("low-pass of second order"), number(f, ".4g"), "", "") for f in found.feedback.low_passes]
+    corners = [(tr("low-pass of second order"), number(f, ".4g"), "", "") for f in proposal.feedback.low_passes]
     headings = (tr("filter"), "Hz", tr("depth in dB"), tr("width (damping)"))
     return PrintedTable(headings, (*notches, *corners), (1, 2, 3))

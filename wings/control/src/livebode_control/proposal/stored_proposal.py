@@ -50,10 +50,10 @@ class StoredProposal(BaseModel):
     entry: str | None = None
 
 
-def store_proposal(found: ControllerProposal, directory: Path, loop: LoopSection | None, entry: str | None) -> None:
+def store_proposal(proposal: ControllerProposal, directory: Path, loop: LoopSection | None, entry: str | None) -> None:
     """Write tune.json: the proposal, and the description of the loop and the entry that were given for it."""
     described = None if loop is None else loop.model_dump(mode="json", exclude_defaults=True, by_alias=True)
-    text = to_json(found.plain() | {"loop": described, "entry": entry}, indent=2)
+    text = to_json(proposal.plain() | {"loop": described, "entry": entry}, indent=2)
     write_whole(directory / _FILE, f"{text}\n".encode())
 
 
@@ -95,17 +95,19 @@ def newest_proposal(directory: Path, entry: str | None = None) -> ControllerProp
         return None
     from livebode_control.proposal.tune_report import tune_run  # with SciPy
 
-    found = tune_run(directory, stored.specification, stored.loop, loop_checked=True, entry=entry)
-    before, now = (np.array([*_numbers(one)]) for one in (stored.controller, found.plain()["controller"]))
+    proposal = tune_run(directory, stored.specification, stored.loop, loop_checked=True, entry=entry)
+    before, now = (
+        np.array([*_numbers(controller)]) for controller in (stored.controller, proposal.plain()["controller"])
+    )
     if before.shape != now.shape or not np.allclose(before, now, rtol=_SAME, atol=0.0):
         raise _again(directory, "has another proposal than the run gives now")
-    return found
+    return proposal
 
 
-def _again(directory: Path, what: str) -> RecordError:
+def _again(directory: Path, problem: str) -> RecordError:
     return RecordError(
         "proposal-invalid",
-        f"{str(directory / _FILE)!r} {what}",
+        f"{str(directory / _FILE)!r} {problem}",
         "use livebode tune again",
         path=str(directory / _FILE),
     )
@@ -114,7 +116,7 @@ def _again(directory: Path, what: str) -> RecordError:
 def _numbers(value: Any) -> Iterator[float]:
     """All numbers in nested data, in order."""
     if isinstance(value, dict | list):
-        for one in value.values() if isinstance(value, dict) else value:
-            yield from _numbers(one)
+        for number in value.values() if isinstance(value, dict) else value:
+            yield from _numbers(number)
     elif isinstance(value, int | float) and not isinstance(value, bool):
         yield float(value)

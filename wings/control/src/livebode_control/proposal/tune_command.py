@@ -1,4 +1,4 @@
-"""`livebode tune`: a controller for the loop of a finished run."""
+"""`livebode tune`: a controller for the loop of a finished run, or an input shaper for its load."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from livebode.cli import Entry, Json, results_directory
+from livebode.cli import Entry, Json, check_use, results_directory
 from livebode.core import RecordError, TuneError, UsageError, write_whole, writing
 from livebode.locations import location
 
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 
 def tune_command(
+    context: typer.Context,
     directory: Annotated[Path, typer.Argument(metavar="RUN", help="Run directory.", parser=location)],
     axis: Annotated[
         Path | None, typer.Option(metavar="AXIS.toml", help="Read \\[loop] from this file instead of the run.")
@@ -61,15 +62,46 @@ def tune_command(
         ),
     ] = None,
     entry: Entry = None,
+    shaper: Annotated[
+        bool, typer.Option("--shaper", help="Propose input shapers for a mode of the fitted model instead.")
+    ] = False,
+    model: Annotated[
+        str | None,
+        typer.Option(
+            help="For --shaper: two-mass, two-mass-gain, three-mass or modal, as in fit. \\[default: the run's [fit]]"
+        ),
+    ] = None,
+    mode: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="For --shaper: antiresonance (the load swings while a stiff drive holds the motor) or resonance; of "
+            "several, with a number: resonance_2; of modal frequency_1, … \\[default: antiresonance; of modal "
+            "frequency_1]",
+        ),
+    ] = None,
+    tolerance: Annotated[float, typer.Option(help="For --shaper: share of the vibration that may remain.")] = 0.05,
+    klipper_axis: Annotated[
+        str, typer.Option(metavar="x|y|z", help="For --shaper: axis in the text for Klipper.")
+    ] = "x",
     as_json: Json = False,
 ) -> None:
-    """Propose gains and filters for the described cascade, safe for every plant within the bounds of the run.
+    """Propose gains and filters for the described cascade, safe for every plant within bounds; or input shapers.
 
     Writes tune.png, the gains as gains.toml, the filters as filters.h and filters.st, and for `livebode report` the
     whole as tune.json, to the run directory; nothing to a machine. The exit code is 2 if no controller meets the
     specification. With --entry of a matrix run it is the controller between that output and input, and the plant that
     it sees while the other [[loop.controllers]] are active as described.
+
+    With --shaper, ZV, ZVD, EI and an optimised shaper are computed over the bounds of a mode at every place of the run.
+    The shortest with enough effect is written as shaper.h and shaper.st, and the best that Klipper has as shaper.cfg.
     """
+    check_use(context, "--shaper", ("--model", "--mode", "--tolerance", "--klipper-axis"))
+    if shaper:
+        from livebode_control.proposal.shaper_output import propose_shaper
+
+        propose_shaper(directory, model, mode, tolerance, klipper_axis, as_json=as_json)
+        return
     if entry is not None and (schedule or strokes is not None):
         raise _not_of_an_entry()
     from livebode.cli import can_draw, tell_how_to_draw
@@ -95,10 +127,10 @@ def tune_command(
         coherence=coherence,
     )
     other = None if axis is None else read_loop(axis)
-    found = tune_run(directory, specification, other, loop_checked=loop_checked, entry=entry)
+    proposal = tune_run(directory, specification, other, loop_checked=loop_checked, entry=entry)
     moves = None if strokes is None else location(strokes)
     # Several motors share the inertia that an entry of a matrix would show.
-    forward = feedforward_of(directory, found.feedback.controller, moves) if entry is None else None
+    forward = feedforward_of(directory, proposal.feedback.controller, moves) if entry is None else None
     gains = schedule_run(directory, specification, other, loop_checked=loop_checked) if schedule else None
     into = results_directory(directory)
     with writing(into, RecordError):
@@ -106,20 +138,22 @@ def tune_command(
             from livebode_control.proposal.tuning_picture import save_tuning_picture
 
             title = directory.name if entry is None else f"{directory.name}: {entry}"
-            save_tuning_picture(found, into, gains=gains, feedforward=forward, title=title)
-        store_proposal(found, into, other, entry)
-        write_whole(into / "filters.h", c_header(found.feedback.biquads).encode())
-        write_whole(into / "gains.toml", gains_toml(found.feedback.controller).encode())
+            save_tuning_picture(proposal, into, gains=gains, feedforward=forward, title=title)
+        store_proposal(proposal, into, other, entry)
+        write_whole(into / "filters.h", c_header(proposal.feedback.biquads).encode())
+        write_whole(into / "gains.toml", gains_toml(proposal.feedback.controller).encode())
         if odrive:
-            write_whole(into / "odrive.txt", odrive_text(found.feedback).encode())
+            write_whole(into / "odrive.txt", odrive_text(proposal.feedback).encode())
         if gains is not None:
             write_whole(into / "gains.csv", gains.csv().encode())
-        write_whole(into / "filters.st", structured_text(found.feedback.biquads).encode())
+        write_whole(into / "filters.st", structured_text(proposal.feedback.biquads).encode())
     if as_json:
         more = {"feedforward": forward, "schedule": gains}
-        print(to_json(found.plain() | {name: None if one is None else one.plain() for name, one in more.items()}))
+        print(
+            to_json(proposal.plain() | {name: None if extra is None else extra.plain() for name, extra in more.items()})
+        )
     else:
-        show_proposal(found)
+        show_proposal(proposal)
         if entry is None:
             show_feedforward(forward)
         else:
@@ -130,13 +164,13 @@ def tune_command(
         written = ["tune.json", "gains.toml", "filters.h", "filters.st", *(name for name, use in also.items() if use)]
         print(f"\n{into}: {', '.join(written)}")
         tell_how_to_draw()
-    if not found.met:
+    if not proposal.met:
         raise TuneError(
             "specification-unmet",
-            found.sentence,
+            proposal.sentence,
             "require less, or remove what limits it",
-            bandwidth_hz=found.promised.bandwidth_hz,
-            limited_by=list(found.limited_by),
+            bandwidth_hz=proposal.promised.bandwidth_hz,
+            limited_by=list(proposal.limited_by),
         )
 
 
@@ -149,51 +183,53 @@ def _not_of_an_entry() -> UsageError:
     )
 
 
-def show_proposal(found: ControllerProposal) -> None:
+def show_proposal(proposal: ControllerProposal) -> None:
     """Print controller, filters and margins before and after."""
     print("proposal (nothing is written to a machine)")
-    _show_parameters(found)
-    for frequency_hz, depth_db, damping in found.feedback.notches:
+    _show_parameters(proposal)
+    for frequency_hz, depth_db, damping in proposal.feedback.notches:
         print(f"  notch at {frequency_hz:.4g} Hz, {depth_db:.3g} dB deep, damping {damping:.3g}")
-    for corner_hz in found.feedback.low_passes:
+    for corner_hz in proposal.feedback.low_passes:
         print(f"  low-pass of second order at {corner_hz:.4g} Hz")
-    for biquad in found.feedback.biquads:
+    for biquad in proposal.feedback.biquads:
         b, a = (", ".join(f"{x:.12g}" for x in part) for part in (biquad.b, biquad.a))
         print(f"    at {biquad.rate_hz:g} Hz: b = {b}   a = 1, {a}")
-    _show_margins(found)
-    print(found.sentence)
-    print(found.reach.sentence)
+    _show_margins(proposal)
+    print(proposal.sentence)
+    print(proposal.reach.sentence)
 
 
-def show_schedule(found: GainSchedule) -> None:
+def show_schedule(schedule: GainSchedule) -> None:
     """Print the gains of each place, and the promised bandwidth with these and with one controller."""
     print("gains over the schedule, with the filters above; bandwidth also with one controller for all places")
-    print("  " + "".join(f"{name:>16}" for name in ("place", *found.names, "bandwidth, Hz", "one controller")))
-    for place, row, promised, common in zip(found.position, found.logarithms, found.promised, found.common_promised):
+    print("  " + "".join(f"{name:>16}" for name in ("place", *schedule.names, "bandwidth, Hz", "one controller")))
+    for place, row, promised, common in zip(
+        schedule.position, schedule.logarithms, schedule.promised, schedule.common_promised
+    ):
         numbers = (place, *(exp(x) for x in row), promised.bandwidth_hz, common.bandwidth_hz)
         print("  " + "".join(f"{x:>16.5g}" for x in numbers))
-    print(f"  {found.reach.sentence}")
-    if not found.share:
+    print(f"  {schedule.reach.sentence}")
+    if not schedule.share:
         print("  no other gains keep the limits between the places")
 
 
-def show_feedforward(found: Feedforward | None) -> None:
+def show_feedforward(forward: Feedforward | None) -> None:
     """Print inertia and friction with their bounds, in the units of the recording."""
-    if found is None:
+    if forward is None:
         print("feedforward: the lines do not show the inertia")
         return
     print("feedforward (95 %, units of the recording)")
     for name in ("inertia", "viscous", "coulomb", "offset"):
-        if (value := getattr(found, name)) is not None:
-            print(f"  {name:32}{value:>12.5g} ± {getattr(found, f'{name}_bound'):.2g}")
-    if found.coulomb is None:
+        if (value := getattr(forward, name)) is not None:
+            print(f"  {name:32}{value:>12.5g} ± {getattr(forward, f'{name}_bound'):.2g}")
+    if forward.coulomb is None:
         print("  friction: the recording has no strokes in both directions; name some: --strokes")
 
 
-def _show_parameters(found: ControllerProposal) -> None:
+def _show_parameters(proposal: ControllerProposal) -> None:
     from dataclasses import asdict
 
-    old, new = asdict(found.loop.feedback), asdict(found.feedback.controller)  # type: ignore[call-overload]
+    old, new = asdict(proposal.loop.feedback), asdict(proposal.feedback.controller)  # type: ignore[call-overload]
     for name, value in _numbers(new).items():
         before = _numbers(old)[name]
         if before != value:
@@ -201,16 +237,16 @@ def _show_parameters(found: ControllerProposal) -> None:
 
 
 def _numbers(values: dict[str, object], prefix: str = "") -> dict[str, float]:
-    found: dict[str, float] = {}
+    numbers: dict[str, float] = {}
     for name, value in values.items():
         if isinstance(value, dict):
-            found |= _numbers(value, f"{prefix}{name}.")
+            numbers |= _numbers(value, f"{prefix}{name}.")
         elif isinstance(value, float):
-            found[f"{prefix}{name}"] = value
-    return found
+            numbers[f"{prefix}{name}"] = value
+    return numbers
 
 
-def _show_margins(found: ControllerProposal) -> None:
+def _show_margins(proposal: ControllerProposal) -> None:
     """Before and after, each as measured and, in brackets, for the worst plant within the bounds."""
     words = {
         "gain_margin_db": "gain margin, dB",
@@ -219,18 +255,20 @@ def _show_margins(found: ControllerProposal) -> None:
         "disk_margin": "disk margin",
         "bandwidth_hz": "bandwidth, Hz",
     }
-    rows = len(found.plant.value)
+    rows = len(proposal.plant.value)
     print(f"  {'':18}{'before (worst plant)':>24}{'after (promised)':>24}")
     for name, word in words.items():
         cells = [
-            "unstable" if one is None or two is None else f"{getattr(one, name):.4g} ({getattr(two, name):.4g})"
-            for one, two in ((found.before, found.before_worst), (found.after, found.promised))
+            "unstable"
+            if measured is None or promised is None
+            else f"{getattr(measured, name):.4g} ({getattr(promised, name):.4g})"
+            for measured, promised in ((proposal.before, proposal.before_worst), (proposal.after, proposal.promised))
         ]
         print(f"  {word:18}{cells[0]:>24}{cells[1]:>24}")
-    word = "noise gain" if found.specification.encoder_step is None else "input noise, rms"
-    print(f"  {word:18}{found.noise[0]:>24.4g}{found.noise[1]:>24.4g}")
-    places = f"{rows} places, " if rows > 1 else ""
+    word = "noise gain" if proposal.specification.encoder_step is None else "input noise, rms"
+    print(f"  {word:18}{proposal.noise[0]:>24.4g}{proposal.noise[1]:>24.4g}")
+    places, lines_hz = f"{rows} places, " if rows > 1 else "", proposal.plant.lines_hz
     print(
-        f"  {places}{found.plant.lines_hz.size} lines, {found.plant.lines_hz[0]:g} … {found.plant.lines_hz[-1]:g} Hz; "
-        f"the true plant is within the bounds with {100 * found.specification.confidence:g} %, all lines together"
+        f"  {places}{lines_hz.size} lines, {lines_hz[0]:g} … {lines_hz[-1]:g} Hz; "
+        f"the true plant is within the bounds with {100 * proposal.specification.confidence:g} %, all lines together"
     )

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from livebode.analysis import by_place, checked_loop
+from livebode.analysis import by_place, checked_loop, equivalent_plant
 from livebode.configuration import LoopSection, check_controllers, matrix_loop, recorded_configuration, recorded_loop
 from livebode.core import PID, Cascade, LivebodeError, Loop, PositionPD, Responses, SignalError, TuneError
+from livebode.fitting import mean_matrix
 from livebode.locations import Location
-from livebode.mimo import equivalent_plant, mean_matrix
 from livebode.motion import FrictionCurve, OutputKind, friction_curve
 from livebode.records import RunRecord, entry_named
 from livebode_control.strokes.motion_samples import read_strokes
@@ -41,7 +41,7 @@ def tune_run(
     section
         Another description of the loop.
     loop_checked
-        The description was verified otherwise, where no `livebode check-loop` of the run confirms it.
+        The description was verified otherwise, where no `livebode validate --loop` of the run confirms it.
     entry
         Of a matrix run: the controller, "output/input".
 
@@ -77,8 +77,8 @@ def _tune_entry(
         )
     check_controllers(section, outputs, inputs)
     plant = equivalent_plant(responses, matrix_loop(section, list(inputs), list(outputs), rate_hz), output, input)
-    found = tune(plant, own, specification, loop_checked=_confirmed(directory, section) or loop_checked)
-    if found.before is None:
+    proposal = tune(plant, own, specification, loop_checked=_confirmed(directory, section) or loop_checked)
+    if proposal.before is None:
         # Then the other loops alone may be unstable, and what the lines show does not tell a stable proposal.
         raise TuneError(
             "loop-contradicted",
@@ -86,13 +86,13 @@ def _tune_entry(
             "add lines at low frequencies and around the crossover, or correct [[loop.controllers]]",
             key="loop.controllers",
         )
-    return found
+    return proposal
 
 
 def schedule_run(
     directory: Path, specification: LoopSpecification, section: LoopSection | None = None, *, loop_checked: bool = False
 ) -> GainSchedule:
-    """The same with gains that follow the schedule of the run; errors as of `gain_schedule`."""
+    """Gains that follow the schedule of a run, for the specification; errors as of `gain_schedule`."""
     responses, loop, checked = _inputs(directory, section, loop_checked)
     return gain_schedule(responses, loop, specification, loop_checked=checked)
 
@@ -110,7 +110,7 @@ def _inputs(directory: Path, section: LoopSection | None, loop_checked: bool) ->
             "loop-unchecked",
             "the run does not name the excitation w (signals.excitation), with which the described controllers are "
             "compared with the recording",
-            "run again with signals.excitation and use livebode check-loop, or compare them otherwise and state it",
+            "run again with signals.excitation and use livebode validate --loop, or state that they were compared",
             argument="loop_checked",
         )
     return by_place(responses), loop, checked
@@ -150,13 +150,13 @@ def _kind(recorded: str | None, controller: PID | Cascade | PositionPD) -> Outpu
 
 
 def _friction(target: Location, kind: OutputKind) -> FrictionCurve:
-    found = read_strokes(target)
-    return friction_curve(found.block, input=found.input, output=found.output, kind=kind)
+    strokes = read_strokes(target)
+    return friction_curve(strokes.block, input=strokes.input, output=strokes.output, kind=kind)
 
 
 def _confirmed(directory: Path, section: LoopSection) -> bool:
     """Whether the recording confirms this description of the loop; TuneError if it contradicts it."""
-    found = checked_loop(directory, section)
-    if found.verdict in _CONTRADICTED:
-        raise TuneError("loop-contradicted", found.sentence, "correct [loop], and check it again", key="loop")
-    return found.verdict == "as described"
+    check = checked_loop(directory, section)
+    if check.verdict in _CONTRADICTED:
+        raise TuneError("loop-contradicted", check.sentence, "correct [loop], and check it again", key="loop")
+    return check.verdict == "as described"

@@ -38,11 +38,11 @@ class FrictionReport:
     @property
     def differing(self) -> bool:
         """Whether the viscous friction of the directions differs, by more than its bound of 99 %."""
-        at = self.directions.index("asymmetry")
-        return bool(abs(self.directions.value[at]) > self.directions.bound(0.99)[at])
+        index = self.directions.index("asymmetry")
+        return bool(abs(self.directions.value[index]) > self.directions.bound(0.99)[index])
 
     def plain(self) -> dict[str, Any]:
-        """As plain data, for JSON."""
+        """Plain data for JSON."""
         each = {
             name: {"coulomb": value[0], "viscous": value[1], "coulomb_bound": bound[0], "viscous_bound": bound[1]}
             for name, (value, bound) in self.each_way().items()

@@ -70,28 +70,28 @@ def friction_command(
         location(target), input=input, position=position, velocity=velocity, rate_hz=rate, time=time,
         part=motion_part(from_, to),
     )  # fmt: skip
-    found = friction_of(strokes, places=places, band_hz=band, slowest=slowest)
+    report = friction_of(strokes, places=places, band_hz=band, slowest=slowest)
     into = picture or (None if strokes.run is None else results_directory(strokes.run) / "friction.png")
     if into is not None and can_draw():
         from livebode_control.strokes.friction_picture import save_friction_picture
 
         with writing(into, OutputError):
-            save_friction_picture(found, into, title=Path(target).name)
+            save_friction_picture(report, into, title=Path(target).name)
     if as_json:
-        print(to_json(found.plain()))
+        print(to_json(report.plain()))
         return
-    show_friction(found)
+    show_friction(report)
     if into is not None:
         print(f"\n{into}" if can_draw() else "")
         tell_how_to_draw()
 
 
-def show_friction(found: FrictionReport) -> None:
+def show_friction(report: FrictionReport) -> None:
     """Print the parameters with bounds, those of each direction, and those of each place."""
     from rich.measure import Measurement
     from rich.table import Table
 
-    curve, strokes = found.curve, found.strokes
+    curve, strokes = report.curve, report.strokes
     screen = console(markup=False)
     seconds = len(strokes.block) / strokes.block.rate_hz
     left = strokes.recorded - len(strokes.block)
@@ -103,12 +103,12 @@ def show_friction(found: FrictionReport) -> None:
     table = Table(box=None, header_style="bold")
     for heading in ("", "both", "± 95 %", "forward", "± 95 %", "backward", "± 95 %", "unit"):
         table.add_column(heading, justify="right" if heading not in ("", "unit") else "left", no_wrap=True)
-    bound, each = curve.bound(), found.each_way()
-    for i, name in sorted(enumerate(curve.names), key=lambda one: list(_WORDS).index(one[1])):
+    bound, each = curve.bound(), report.each_way()
+    for i, name in sorted(enumerate(curve.names), key=lambda pair: list(_WORDS).index(pair[1])):
         row = [_WORDS[name], f"{curve.value[i]:.4g}", f"{bound[i]:.2g}"]
         for way in ("forward", "backward"):
-            at = {"coulomb": 0, "viscous": 1}.get(name)
-            row += ["", ""] if at is None else [f"{each[way][0][at]:.4g}", f"{each[way][1][at]:.2g}"]
+            index = {"coulomb": 0, "viscous": 1}.get(name)
+            row += ["", ""] if index is None else [f"{each[way][0][index]:.4g}", f"{each[way][1][index]:.2g}"]
         table.add_row(*row, curve.units[i])
     screen.width = max(
         screen.width, Measurement.get(screen, screen.options.update(max_width=_WIDTH_MAX), table).maximum
@@ -116,22 +116,22 @@ def show_friction(found: FrictionReport) -> None:
     screen.print(table)
     if "stribeck" not in curve.names:
         screen.print("no Stribeck friction is visible (99.9 %)")
-    if found.differing:
+    if report.differing:
         screen.print("the viscous friction differs between the directions (99 %); 'both' is its mean", soft_wrap=True)
-    if found.places is not None:
-        _show_places(found)
+    if report.places is not None:
+        _show_places(report)
 
 
-def _show_places(found: FrictionReport) -> None:
+def _show_places(report: FrictionReport) -> None:
     from rich.table import Table
 
-    curve = found.places
+    curve = report.places
     assert curve is not None
     table = Table(box=None, header_style="bold")
     for heading in ("position", "Coulomb", "± 95 %"):
         table.add_column(heading, justify="right")
     bound = curve.bound()
-    for j, at in enumerate(curve.places):
+    for j, place in enumerate(curve.places):
         i = curve.index(f"coulomb_{j + 1}")
-        table.add_row(f"{at:.4g}", f"{curve.value[i]:.4g}", f"{bound[i]:.2g}")
+        table.add_row(f"{place:.4g}", f"{curve.value[i]:.4g}", f"{bound[i]:.2g}")
     console(markup=False).print(table)

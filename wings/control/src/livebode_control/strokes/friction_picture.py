@@ -30,18 +30,18 @@ class FrictionCurves(Protocol):
     def places(self) -> FrictionCurve | None: ...
 
 
-def save_friction_picture(found: FrictionCurves, path: Path, *, title: str = "", dark: bool = False) -> Path:
+def save_friction_picture(curves: FrictionCurves, path: Path, *, title: str = "", dark: bool = False) -> Path:
     """Write the picture."""
-    return save(friction_figure(found, title=title, dark=dark), path, style(dark))
+    return save(friction_figure(curves, title=title, dark=dark), path, style(dark))
 
 
-def friction_figure(found: FrictionCurves, *, title: str = "", dark: bool = False) -> Figure:
+def friction_figure(curves: FrictionCurves, *, title: str = "", dark: bool = False) -> Figure:
     """Friction over speed: dots are the smoothed input without inertia and constant force, the band covers 95 %.
 
     The dashed line is that of each direction. With places, Coulomb friction over the position is on the right.
     """
-    look, curve, each = style(dark), found.curve, found.directions
-    columns = 1 if found.places is None else 2
+    look, curve, each = style(dark), curves.curve, curves.directions
+    columns = 1 if curves.places is None else 2
     with drawing(look):
         figure = new_figure(7.2 + 4.6 * (columns - 1), 4.6)
         width, height = figure.get_size_inches()
@@ -71,12 +71,12 @@ def friction_figure(found: FrictionCurves, *, title: str = "", dark: bool = Fals
         axes.set_xlabel(labelled("speed", speed_unit(curve)))
         axes.set_ylabel(labelled("friction", curve.units[curve.index("coulomb")]))
         axes.legend(loc="upper left")
-        if found.places is not None:
+        if curves.places is not None:
             places = figure.add_subplot(grid[0, 1])
-            at = [found.places.index(f"coulomb_{j + 1}") for j in range(found.places.places.size)]
+            indices = [curves.places.index(f"coulomb_{j + 1}") for j in range(curves.places.places.size)]
             places.errorbar(
-                found.places.places, found.places.value[at], found.places.bound()[at], color=look.run, marker="o",
-                markersize=4, capsize=3, linewidth=1.4,
+                curves.places.places, curves.places.value[indices], curves.places.bound()[indices],
+                color=look.run, marker="o", markersize=4, capsize=3, linewidth=1.4,
             )  # fmt: skip
             places.set_xlabel("position")
             places.set_ylabel(labelled("Coulomb friction", curve.units[curve.index("coulomb")]))

@@ -40,10 +40,10 @@ def without_lines(strokes: Sequence[Stroke], shafts: Sequence[Shaft], lines_hz: 
         return list(strokes), lines_hz
     columns = 2 * (lines_hz.size + sum(len(shaft.orders) for shaft in shafts))
     normal, moment = np.zeros((columns, columns)), np.zeros((columns, len(strokes[0].torque)))
-    for one in strokes:
-        tapered = _columns(one, shafts, lines_hz) * _taper(one)[:, np.newaxis]
+    for stroke in strokes:
+        tapered = _columns(stroke, shafts, lines_hz) * _taper(stroke)[:, np.newaxis]
         normal += tapered.T @ tapered
-        moment += tapered.T @ (one.torque * _taper(one)).T
+        moment += tapered.T @ (stroke.torque * _taper(stroke)).T
     scale = np.sqrt(np.diag(normal))
     inverse = np.linalg.inv(normal / np.outer(scale, scale) + _RIDGE * np.eye(columns))
     value = inverse @ (moment / scale[:, np.newaxis]) / scale[:, np.newaxis]
@@ -51,7 +51,8 @@ def without_lines(strokes: Sequence[Stroke], shafts: Sequence[Shaft], lines_hz: 
     subtract = (alone >= _SEPARATE) & _constant(strokes, shafts, lines_hz, value[:, 0])
     take = np.concatenate([np.tile(subtract, 2), np.zeros(columns - 2 * lines_hz.size, dtype=bool)])
     quiet = [
-        replace(one, torque=one.torque - (_columns(one, (), lines_hz[subtract]) @ value[take]).T) for one in strokes
+        replace(stroke, torque=stroke.torque - (_columns(stroke, (), lines_hz[subtract]) @ value[take]).T)
+        for stroke in strokes
     ]
     return quiet, lines_hz[~subtract]
 
@@ -74,19 +75,22 @@ def _constant(strokes: Sequence[Stroke], shafts: Sequence[Shaft], lines_hz: Floa
 
     Long strokes decide. So the degrees of freedom of the sum are those of Satterthwaite.
     """
-    at, beside = np.zeros((2, len(strokes), lines_hz.size))
-    for number, one in enumerate(strokes):
-        rest = (one.torque[0] - _columns(one, shafts, lines_hz) @ value) * _taper(one) ** 2
-        time_s = _time_s(one)
-        bins = np.array([0, *_BESIDE]) * one.rate_hz / rest.size
+    on_line, beside = np.zeros((2, len(strokes), lines_hz.size))
+    for number, stroke in enumerate(strokes):
+        residual = (stroke.torque[0] - _columns(stroke, shafts, lines_hz) @ value) * _taper(stroke) ** 2
+        time_s = _time_s(stroke)
+        bins = np.array([0, *_BESIDE]) * stroke.rate_hz / residual.size
         for i, line in enumerate(lines_hz):
-            power = np.abs(np.exp(-2j * np.pi * np.multiply.outer(line + bins, time_s)) @ rest) ** 2
-            at[number, i], beside[number, i] = power[0], power[1:].mean()
+            power = np.abs(np.exp(-2j * np.pi * np.multiply.outer(line + bins, time_s)) @ residual) ** 2
+            on_line[number, i], beside[number, i] = power[0], power[1:].mean()
     noise = np.maximum(beside.sum(axis=0), np.finfo(float).tiny)
-    ratio = at.sum(axis=0) / noise
-    dof = [2 * max(int(one), 1) for one in noise**2 / np.maximum((beside**2).sum(axis=0), np.finfo(float).tiny)]
+    ratio = on_line.sum(axis=0) / noise
+    dof = [2 * max(int(count), 1) for count in noise**2 / np.maximum((beside**2).sum(axis=0), np.finfo(float).tiny)]
     return np.array(
-        [f_exceeded(float(one), many, many * _BESIDE.size) > _FALSE for one, many in zip(ratio, dof, strict=True)]
+        [
+            f_exceeded(float(quotient), many, many * _BESIDE.size) > _FALSE
+            for quotient, many in zip(ratio, dof, strict=True)
+        ]
     )
 
 

@@ -140,10 +140,10 @@ def _recorded_axis(run: Path) -> Axis:
     return Axis.of(kept, str(run))
 
 
-def _missing(argument: str, what: str) -> UsageError:
+def _missing(argument: str, name: str) -> UsageError:
     return UsageError(
         "missing",
-        f"{what} is not known",
+        f"{name} is not known",
         f"name its channel by {argument}, or name a configuration or a run",
         argument=argument,
     )

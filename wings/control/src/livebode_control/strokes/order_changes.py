@@ -53,7 +53,7 @@ class OrderChange:
         return f"order {self.order} of the {self.shaft} changed: {before} before, {after} now"
 
     def plain(self) -> dict[str, Any]:
-        """As plain data, for JSON; bounds of 95 %."""
+        """Plain data for JSON; bounds of 95 %."""
         return {
             "shaft": self.shaft,
             "order": self.order,
@@ -115,10 +115,10 @@ def order_changes(
     total = variance.sum(axis=0)
     sigma, joint = np.sqrt(total), total**2 / np.sum(variance**2 / dof, axis=0)
     difference = np.abs(np.diff(value if phases else np.abs(value), axis=0)[0])
-    one, all_at_once = (widened(sigma, joint, float(np.sqrt(np.log(k)))) for k in (20.0, len(both) / false_alarm))
+    single, all_at_once = (widened(sigma, joint, float(np.sqrt(np.log(k)))) for k in (20.0, len(both) / false_alarm))
     return [
         OrderChange(*key, complex(value[0, i]), complex(value[1, i]), float(bound[0, i]), float(bound[1, i]),
-                    float(difference[i]), float(one[i]), bool(difference[i] > all_at_once[i]))
+                    float(difference[i]), float(single[i]), bool(difference[i] > all_at_once[i]))
         for i, key in enumerate(both)
     ]  # fmt: skip
 
@@ -126,8 +126,8 @@ def order_changes(
 def _known(shafts: Sequence[ShaftOrders]) -> dict[tuple[str, int], tuple[complex, float, float, float]]:
     """Value, sigma, degrees of freedom and bound (95 %) of the known orders, by shaft and order."""
     return {
-        (one.shaft.name, order): row
-        for one in shafts
-        for order, row in zip(one.shaft.orders, zip(one.value, one.sigma, one.dof, one.bound()))
+        (orders.shaft.name, order): row
+        for orders in shafts
+        for order, row in zip(orders.shaft.orders, zip(orders.value, orders.sigma, orders.dof, orders.bound()))
         if np.isfinite(row[1])
     }

@@ -83,16 +83,18 @@ class OrderReport:
         return order_changes(baseline.shafts, self.shafts, phases=same_zero)
 
     def plain(self) -> dict[str, Any]:
-        """As plain data, for JSON."""
+        """Plain data for JSON."""
         return {
-            "shafts": [one.plain() for one in self.shafts],
-            "position_errors": [row for one in self.errors for row in one.plain()],
+            "shafts": [shaft.plain() for shaft in self.shafts],
+            "position_errors": [row for error in self.errors for row in error.plain()],
             "unit": self.unit,
             "strokes": self.strokes,
             "turns_per_s": list(self.speed_hz),
             "lines_hz": self.lines_hz.tolist(),
             "subtracted_lines_hz": self.subtracted_hz.tolist(),
-            "found_lines": [{"frequency_hz": one.frequency_hz, "amplitude": one.amplitude} for one in self.found_lines],
+            "found_lines": [
+                {"frequency_hz": line.frequency_hz, "amplitude": line.amplitude} for line in self.found_lines
+            ],
             "inertia": self.friction["inertia"],
             "inertia_bound": float(self.friction.bound()[self.friction.index("inertia")]),
             "input": self.motion.input,
@@ -156,11 +158,11 @@ def orders_of(
     # The steps of the friction at reversals make the inertia depend on a delay of the input.
     delayed = search.friction(search.one_sample_later(), band_hz, slowest)
     inertia_per_s = (delayed["inertia"] - curve["inertia"]) * motion.block.rate_hz
-    found = search.result(curve, inertia_per_s)
-    if any(one.seen.any() for one in found.shafts):
-        curve = search.friction(search.without_ripple(found.shafts), band_hz, slowest)
-        found = search.result(curve, inertia_per_s)
-    return found
+    search_result = search.result(curve, inertia_per_s)
+    if any(shaft.seen.any() for shaft in search_result.shafts):
+        curve = search.friction(search.without_ripple(search_result.shafts), band_hz, slowest)
+        search_result = search.result(curve, inertia_per_s)
+    return search_result
 
 
 @dataclass(frozen=True, eq=False)
@@ -203,15 +205,15 @@ class _Search:
             per_delay_s = value[2] + inertia_per_s * value[1]
             return shaft_orders(windows, shaft, value[0], extra, per_delay_s, lines, limit), errors, speeds
 
-        found = [shaft_found(shaft, remaining) for shaft in self.shafts]
-        lines = _unknown_lines(strokes, [one for one, _, _ in found], self.known_hz, limit, kernel)
+        results = [shaft_found(shaft, remaining) for shaft in self.shafts]
+        lines = _unknown_lines(strokes, [orders for orders, _, _ in results], self.known_hz, limit, kernel)
         if lines:
             away = np.concatenate([remaining, [line.frequency_hz for line in lines]])
-            found = [shaft_found(shaft, away) for shaft in self.shafts]
-        speeds = [speed for _, _, both in found for speed in both]
+            results = [shaft_found(shaft, away) for shaft in self.shafts]
+        speeds = [speed for _, _, both in results for speed in both]
         return OrderReport(
-            shafts=[one for one, _, _ in found],
-            errors=[one for _, one, _ in found],
+            shafts=[orders for orders, _, _ in results],
+            errors=[error for _, error, _ in results],
             friction=curve,
             strokes=len(strokes),
             speed_hz=(min(speeds), max(speeds)),
@@ -230,7 +232,7 @@ class _Search:
         data[row, 1:] = block.data[row, :-1]
         return replace(block, data=data)
 
-    def without_ripple(self, found: list[ShaftOrders]) -> Block:
+    def without_ripple(self, shafts: list[ShaftOrders]) -> Block:
         """The samples as the axis would need them without the orders that are seen.
 
         In slow motion a ripple is within the band of the friction, and moves the axis: its acceleration is then
@@ -238,19 +240,26 @@ class _Search:
         """
         block = self.motion.block
         data = block.data.copy()
-        data[block.index(self.motion.input)] += sum(one.torque(self.angle * one.shaft.turns) for one in found)
+        data[block.index(self.motion.input)] += sum(orders.torque(self.angle * orders.shaft.turns) for orders in shafts)
         return replace(block, data=data)
 
 
 def _unknown_lines(
-    strokes: list[Stroke], found: list[ShaftOrders], known: Floats, highest_hz: float, kernel: SmoothKernel
+    strokes: list[Stroke], shafts: list[ShaftOrders], known: Floats, highest_hz: float, kernel: SmoothKernel
 ) -> list[TimeLine]:
     """Lines of the time in what the orders leave, without those that are known."""
     rests = [
-        replace(one, torque=one.torque[:1] - sum(shaft.torque(one.angle * shaft.shaft.turns) for shaft in found))
-        for one in strokes
+        replace(
+            stroke, torque=stroke.torque[:1] - sum(shaft.torque(stroke.angle * shaft.shaft.turns) for shaft in shafts)
+        )
+        for stroke in strokes
     ]
-    seen = [order * one.shaft.turns for one in found for order, is_seen in zip(one.shaft.orders, one.seen) if is_seen]
+    seen = [
+        order * orders.shaft.turns
+        for orders in shafts
+        for order, is_seen in zip(orders.shaft.orders, orders.seen)
+        if is_seen
+    ]
     return [
         TimeLine(line.frequency_hz, line.amplitude / float(kernel.left(np.array(line.frequency_hz))))
         for line in time_lines(rests, highest_hz, seen)
@@ -269,8 +278,8 @@ def _signals(motion: MotionSamples, curve: FrictionCurve, kernel: SmoothKernel) 
     order = 0 if motion.kind == "velocity" else 1
     speed, acceleration = kernel.smooth(y, order), kernel.smooth(y, order + 1)
     friction, _ = curve.at(speed)
-    rest = curve["inertia"] * acceleration + friction + curve["offset"] - kernel.smooth(u)
-    return np.stack([rest, acceleration, kernel.smooth(u, 1)]), speed
+    remainder = curve["inertia"] * acceleration + friction + curve["offset"] - kernel.smooth(u)
+    return np.stack([remainder, acceleration, kernel.smooth(u, 1)]), speed
 
 
 def _angle(motion: MotionSamples, angle: str | None) -> Floats:
@@ -279,10 +288,10 @@ def _angle(motion: MotionSamples, angle: str | None) -> Floats:
         if motion.kind == "position":
             return y
         return np.asarray((np.cumsum(y) - y / 2) / motion.block.rate_hz)
-    found = motion.block[angle]
-    if not np.ptp(found) > 0:
+    angles = motion.block[angle]
+    if not np.ptp(angles) > 0:
         raise SignalError(
             "channel-constant", f"the angle {angle!r} is constant", "name the channel of the motor's angle",
             channel=angle,
         )  # fmt: skip
-    return found
+    return angles

@@ -29,9 +29,6 @@ def orders_command(
     angle: Annotated[
         str | None, typer.Option(metavar="CHANNEL", help="Angle of the motor, if the velocity is used.")
     ] = None,
-    turn: Annotated[
-        float | None, typer.Option(metavar="UNITS", help="Units of the angle in a turn. \\[default: 2π]")
-    ] = None,
     shaft: Annotated[
         list[str] | None,
         typer.Option(
@@ -101,33 +98,33 @@ def orders_command(
             samples,
             shafts,
             angle=samples.angle,
-            turn=turn or section.turn,
+            turn=section.turn,
             lines_hz=_lines(time_lines, samples),
             highest_hz=highest or section.highest_hz or float("inf"),
             band_hz=band,
         )
 
-    found = found_in(motion)
+    report = found_in(motion)
     changes: list[OrderChange] | None = None
     if baseline is not None:
         channels = {motion.kind: motion.output, "input": motion.input, "angle": motion.angle}
         before = found_in(read_strokes(location(baseline), rate_hz=rate, time=time, **channels))  # type: ignore[arg-type]
-        changes = found.changes_from(before, phases=not other_zero)
+        changes = report.changes_from(before, phases=not other_zero)
     into = picture or (None if motion.run is None else results_directory(motion.run) / "orders.png")
     if into is not None and can_draw():
         from livebode_control.strokes.orders_picture import save_orders_picture
 
         with writing(into, OutputError):
-            save_orders_picture(found, into, title=Path(target).name)
+            save_orders_picture(report, into, title=Path(target).name)
     if table is not None:
-        _write_table(found, table, target)
+        _write_table(report, table, target)
     if as_json:
-        more = {} if changes is None else {"changes": [one.plain() for one in changes]}
-        print(to_json(found.plain() | more))
+        more = {} if changes is None else {"changes": [change.plain() for change in changes]}
+        print(to_json(report.plain() | more))
         return
-    show_orders(found)
+    show_orders(report)
     if changes is not None:
-        show_changes(changes, found, Path(str(baseline)).name)
+        show_changes(changes, report, Path(str(baseline)).name)
     if table is not None:
         print(f"feedforward of the motor, to be added to the torque: {table}")
     if into is not None:
@@ -138,8 +135,8 @@ def orders_command(
 def _shaft(text: str) -> Shaft:
     from livebode.motion import Shaft
 
-    name, _, rest = text.partition("=")
-    turns, _, orders = rest.partition(":")
+    name, _, description = text.partition("=")
+    turns, _, orders = description.partition(":")
     try:
         return Shaft(name.strip(), float(turns), tuple(int(order) for order in orders.split(",")))
     except ValueError:
@@ -159,7 +156,7 @@ def _lines(text: str | None, motion: MotionSamples) -> Any:
     if text is None:
         return motion.lines_hz
     try:
-        return np.array([float(one) for one in text.split(",")])
+        return np.array([float(number) for number in text.split(",")])
     except ValueError:
         raise UsageError(
             "unreadable",
@@ -170,12 +167,12 @@ def _lines(text: str | None, motion: MotionSamples) -> Any:
         ) from None
 
 
-def _write_table(found: OrderReport, path: Path, target: str) -> None:
+def _write_table(report: OrderReport, path: Path, target: str) -> None:
     import numpy as np
 
     from livebode_control.strokes.angle_table import write_angle_table
 
-    motor = next((one for one in found.shafts if one.shaft.turns == 1), None)
+    motor = next((shaft for shaft in report.shafts if shaft.shaft.turns == 1), None)
     if motor is None or not motor.seen.any():
         raise UsageError(
             "conflict",
@@ -183,7 +180,7 @@ def _write_table(found: OrderReport, path: Path, target: str) -> None:
             "name its orders, or record more strokes",
             argument="table",
         )
-    at = np.arange(_POINTS) * 2 * np.pi / _POINTS
+    angle = np.arange(_POINTS) * 2 * np.pi / _POINTS
     note = [f"livebode orders {Path(target).name}"] + [
         f"order {order}: {amplitude:.6g} +- {bound:.2g}, phase {phase:.4g} deg"
         for order, amplitude, bound, phase, seen in zip(
@@ -192,31 +189,31 @@ def _write_table(found: OrderReport, path: Path, target: str) -> None:
         if seen
     ]
     with writing(path, OutputError):
-        write_angle_table(path, -motor.torque(at), note, found.unit)
+        write_angle_table(path, -motor.torque(angle), note, report.unit)
 
 
-def show_orders(found: OrderReport) -> None:
+def show_orders(report: OrderReport) -> None:
     """Print the orders of each shaft that are seen, or that cannot be separated from a line."""
     import numpy as np
 
     screen = console(markup=False)
-    low, high = found.speed_hz
-    left_out = np.setdiff1d(found.lines_hz, found.subtracted_hz)
+    low, high = report.speed_hz
+    left_out = np.setdiff1d(report.lines_hz, report.subtracted_hz)
     lines = "".join(
-        f"; lines of the time {what}: {', '.join(f'{f:g}' for f in each)} Hz"
-        for what, each in (("subtracted", found.subtracted_hz), ("left out", left_out))
+        f"; lines of the time {words}: {', '.join(f'{f:g}' for f in each)} Hz"
+        for words, each in (("subtracted", report.subtracted_hz), ("left out", left_out))
         if each.size
     )
-    screen.print(f"{found.strokes} strokes at {low:.3g} … {high:.3g} turns/s of the motor{lines}", soft_wrap=True)
-    for line in found.found_lines:
-        size = f"{line.amplitude:.2g} {found.unit}".strip()
+    screen.print(f"{report.strokes} strokes at {low:.3g} … {high:.3g} turns/s of the motor{lines}", soft_wrap=True)
+    for line in report.found_lines:
+        size = f"{line.amplitude:.2g} {report.unit}".strip()
         screen.print(
             f"line of the time found at {line.frequency_hz:.4g} Hz, amplitude {size}: not an order, left out",
             soft_wrap=True,
         )
-    for one in found.shafts:
-        _show_shaft(one, found.unit)
-    for errors in found.errors:
+    for shaft in report.shafts:
+        _show_shaft(shaft, report.unit)
+    for errors in report.errors:
         bound = errors.bound()
         for i in np.flatnonzero(errors.seen):
             screen.print(
@@ -224,20 +221,20 @@ def show_orders(found: OrderReport) -> None:
                 f"error of the measured angle of {abs(errors.value[i]):.3g} ± {bound[i]:.2g} rad of the motor",
                 soft_wrap=True,
             )
-    if not all(one.by_strokes for one in found.shafts):
+    if not all(shaft.by_strokes for shaft in report.shafts):
         screen.print(
             "fewer than four strokes: a line of the time at constant speed is not told from an order", soft_wrap=True
         )
 
 
-def show_changes(changes: list[OrderChange], found: OrderReport, baseline: str) -> None:
+def show_changes(changes: list[OrderChange], report: OrderReport, baseline: str) -> None:
     """Print the orders that changed since the baseline."""
     from livebode_control.strokes.order_changes import FALSE_ALARM
 
     screen = console(markup=False)
-    changed = [one for one in changes if one.changed]
-    for one in changed:
-        screen.print(one.sentence(found.unit), soft_wrap=True)
+    changed = [change for change in changes if change.changed]
+    for change in changed:
+        screen.print(change.sentence(report.unit), soft_wrap=True)
     words = f"{counted(len(changed), 'order') if changed else 'no order'} changed"
     screen.print(
         f"compared with {baseline}: {words} of {len(changes)}; probability of a false alarm {100 * FALSE_ALARM:g} %",
@@ -245,28 +242,30 @@ def show_changes(changes: list[OrderChange], found: OrderReport, baseline: str) 
     )
 
 
-def _show_shaft(one: ShaftOrders, unit: str) -> None:
+def _show_shaft(orders: ShaftOrders, unit: str) -> None:
     from rich.table import Table
 
     screen = console(markup=False)
-    turns = "" if one.shaft.turns == 1 else f", {one.shaft.turns:.4g} turns in one of the motor"
-    screen.print(f"{one.shaft.name}{turns}:", soft_wrap=True)
+    turns = "" if orders.shaft.turns == 1 else f", {orders.shaft.turns:.4g} turns in one of the motor"
+    screen.print(f"{orders.shaft.name}{turns}:", soft_wrap=True)
     table = Table(box=None, header_style="bold")
     for heading in ("order", f"amplitude {unit}".strip(), "± 95 %", "± per ms of delay", "phase deg", "strokes", ""):
         table.add_column(heading, justify="left" if not heading else "right")
-    bound = one.bound()
-    for i, order in enumerate(one.shaft.orders):
-        if one.meets_hz[i] == one.meets_hz[i]:
-            table.add_row(str(order), "", "", "", "", "", f"meets the line at {one.meets_hz[i]:g} Hz at every speed")
-        elif one.seen[i]:
-            numbers = (one.amplitude[i], bound[i], one.per_delay_s[i] / 1000, one.phase_deg[i])
-            table.add_row(str(order), *(f"{value:.3g}" for value in numbers), str(one.strokes[i]), "")
+    bound = orders.bound()
+    for i, order in enumerate(orders.shaft.orders):
+        if orders.meets_hz[i] == orders.meets_hz[i]:
+            table.add_row(str(order), "", "", "", "", "", f"meets the line at {orders.meets_hz[i]:g} Hz at every speed")
+        elif orders.seen[i]:
+            numbers = (orders.amplitude[i], bound[i], orders.per_delay_s[i] / 1000, orders.phase_deg[i])
+            table.add_row(str(order), *(f"{value:.3g}" for value in numbers), str(orders.strokes[i]), "")
     if table.row_count:
         screen.print(table)
-    known = [i for i in range(len(one.shaft.orders)) if not one.seen[i] and one.strokes[i] and bound[i] == bound[i]]
+    known = [
+        i for i in range(len(orders.shaft.orders)) if not orders.seen[i] and orders.strokes[i] and bound[i] == bound[i]
+    ]
     if known:
         most = max(float(bound[i]) for i in known)
         screen.print(f"  not seen: {len(known)} orders, each known to ± {most:.2g} {unit}".rstrip(), soft_wrap=True)
-    lost = sum(1 for i in range(len(bound)) if bound[i] != bound[i] and one.meets_hz[i] != one.meets_hz[i])
+    lost = sum(1 for i in range(len(bound)) if bound[i] != bound[i] and orders.meets_hz[i] != orders.meets_hz[i])
     if lost:
         screen.print(f"  not known: {lost} orders, too fast or in too few strokes", soft_wrap=True)

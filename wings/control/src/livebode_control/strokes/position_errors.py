@@ -46,7 +46,7 @@ class PositionErrors:
         return widened(self.sigma, self.dof, float(c))
 
     def plain(self) -> list[dict[str, Any]]:
-        """As plain data, for JSON; bounds of 95 %, in rad of the motor."""
+        """Plain data for JSON; bounds of 95 %, in rad of the motor."""
         return [
             {
                 "shaft": self.shaft.name,
@@ -82,7 +82,7 @@ def position_errors(
         Of the axis, at the motor.
     """
     many = [_error(windows, order, value[:, i], use[:, i], inertia) for i, order in enumerate(shaft.orders)]
-    error, sigma, dof = (np.array(one) for one in zip(*many))
+    error, sigma, dof = (np.array(values) for values in zip(*many))
     limit = widened(sigma, dof, float(np.sqrt(np.log(len(shaft.orders) / _FALSE))))
     return PositionErrors(shaft, error.astype(np.complex128), sigma, dof, np.abs(error) > limit)
 
@@ -104,12 +104,12 @@ def _error(
     if square.max() < _SPREAD**2 * square.min() or alone:
         return complex(np.nan), np.nan, np.nan
     slope = complex(away @ torque / (away @ away))
-    rest = torque - torque.mean() - slope * away
-    variance, dof = _scatter(away, rest)
+    residual = torque - torque.mean() - slope * away
+    variance, dof = _scatter(away, residual)
     return slope, float(np.sqrt(variance)), dof
 
 
-def _scatter(away: Floats, rest: Complex) -> tuple[float, float]:
+def _scatter(away: Floats, residual: Complex) -> tuple[float, float]:
     """Variance of the slope, and its complex degrees of freedom, without equal noise of all strokes.
 
     `away` is centred. Noise grows with the speed, and fast strokes decide: their residuals alone tell how large it is.
@@ -120,5 +120,5 @@ def _scatter(away: Floats, rest: Complex) -> tuple[float, float]:
     weight = share / (1 - 1 / away.size - share)
     kept = np.eye(away.size) - 1 / away.size - np.outer(away, away) / (away @ away)
     form = (kept * weight) @ kept
-    variance = weight @ np.abs(rest) ** 2 / (away @ away)
+    variance = weight @ np.abs(residual) ** 2 / (away @ away)
     return float(variance), float(np.trace(form) ** 2 / np.sum(form**2))

@@ -77,13 +77,13 @@ class ShaftOrders:
         return np.asarray((self.value[self.seen] * np.exp(1j * np.multiply.outer(angle, k))).real.sum(axis=-1))
 
     def plain(self) -> dict[str, Any]:
-        """As plain data, for JSON; bounds of 95 %."""
+        """Plain data for JSON; bounds of 95 %."""
         names = ("amplitude", "phase_deg", "bound", "error_per_delay_s", "seen", "strokes", "windows", "meets_hz")
         columns = [
             self.amplitude, self.phase_deg, self.bound(), self.per_delay_s, self.seen, self.strokes, self.windows,
             self.meets_hz,
         ]  # fmt: skip
-        rows = [dict(zip(names, (one.item() for one in row))) for row in zip(*columns)]
+        rows = [dict(zip(names, (value.item() for value in row))) for row in zip(*columns)]
         return {
             "shaft": self.shaft.name,
             "turns": self.shaft.turns,
@@ -133,7 +133,7 @@ def shaft_orders(
 
     def means(values: Complex) -> tuple[Any, ...]:
         many = [_mean(values[use[:, i], i], windows.stroke[use[:, i]], by_strokes) for i in range(orders.size)]
-        return tuple(np.array(one) for one in zip(*many))
+        return tuple(np.array(values) for values in zip(*many))
 
     mean, variance, dof = means(value)
     sigma = np.sqrt(variance + extra**2)
@@ -159,12 +159,12 @@ def _mean(value: Complex, stroke: NDArray[np.int64], by_strokes: bool) -> tuple[
     """
     if not by_strokes:
         stroke = np.arange(value.size) // 2  # two neighbours: the others overlap with one of them only
-    groups, at, weight = np.unique(stroke, return_inverse=True, return_counts=True)
+    groups, group, weight = np.unique(stroke, return_inverse=True, return_counts=True)
     if groups.size < 2:
         return complex(np.nan), np.nan, np.nan
     share = weight / weight.sum()
     mean = complex(value.mean())
-    each = np.array([value[at == g].mean() for g in range(groups.size)])
+    each = np.array([value[group == g].mean() for g in range(groups.size)])
     # E Σ share²·|each − mean|² of groups whose variance falls with their number of windows.
     expected = 1 - np.sum(share**2)
     variance = float(np.sum(share**2 * np.abs(each - mean) ** 2)) / expected

@@ -61,7 +61,7 @@ def time_lines(strokes: Sequence[Stroke], highest_hz: float, orders: Sequence[fl
     frequency_hz = np.arange(window // 2 + 1) * rate_hz / window
     use = (np.arange(frequency_hz.size) >= _LOWEST) & (frequency_hz < highest_hz)
     # Where the groups' speeds differ by less, an order could be at one frequency in both.
-    speeds = [np.mean([_turns_per_s(one) for one in group]) for group in groups]
+    speeds = [np.mean([_turns_per_s(stroke) for stroke in group]) for group in groups]
     use &= frequency_hz * (speeds[1] / speeds[0] - 1) > _APART * rate_hz / window
     both = [_ratios(group, window, orders) for group in groups]
     if not use.any() or min(len(ratio) for ratio, _ in both) < _WINDOWS_MIN // 2:
@@ -72,7 +72,7 @@ def time_lines(strokes: Sequence[Stroke], highest_hz: float, orders: Sequence[fl
         use &= count >= _WINDOWS_MIN // 2
         chance = log_sum_exceeded(np.maximum(count, 2) / _OVERLAP, np.nansum(ratio, axis=0) / _OVERLAP)
         use &= chance < limit
-    ratio, power = (np.concatenate([one[i] for one in both]) for i in (0, 1))
+    ratio, power = (np.concatenate([part[i] for part in both]) for i in (0, 1))
     mean = np.nansum(ratio, axis=0) / np.maximum(np.isfinite(ratio).sum(axis=0), 1)
     above = np.maximum(power * (1 - 1 / np.maximum(mean, 1.0)), 0.0).mean(axis=0)
     return [TimeLine(*_peak(k, mean, above, rate_hz, window)) for k in _peaks(mean, use)]
@@ -87,17 +87,17 @@ def _by_speed(strokes: Sequence[Stroke]) -> list[list[Stroke]]:
     ordered = sorted(strokes, key=_turns_per_s)
     if len(ordered) < 2:
         return [list(ordered)]
-    speed = [_turns_per_s(one) for one in ordered]
-    at = int(np.argmax([fast / slow for slow, fast in pairwise(speed)])) + 1
-    return [ordered[:at], ordered[at:]]
+    speed = [_turns_per_s(stroke) for stroke in ordered]
+    cut = int(np.argmax([fast / slow for slow, fast in pairwise(speed)])) + 1
+    return [ordered[:cut], ordered[cut:]]
 
 
 def _window(groups: list[list[Stroke]]) -> int:
     """The longest power of two with which each group has enough windows."""
-    longest = max((one.angle.size for group in groups for one in group), default=0)
+    longest = max((stroke.angle.size for group in groups for stroke in group), default=0)
     window = 1 << max(longest.bit_length() - 1, 0)
     while window >= _SAMPLES_MIN:
-        many = [sum(max(2 * one.angle.size // window - 1, 0) for one in group) for group in groups]
+        many = [sum(max(2 * stroke.angle.size // window - 1, 0) for stroke in group) for group in groups]
         if min(many) >= _WINDOWS_MIN:
             return window
         window //= 2
@@ -107,13 +107,13 @@ def _window(groups: list[list[Stroke]]) -> int:
 def _ratios(group: list[Stroke], window: int, orders: Sequence[float]) -> tuple[Floats, Floats]:
     """Power over the noise around, NaN where an order is, and squared amplitude, of each window, (windows, bins)."""
     hann = np.hanning(window + 1)[:-1]
-    places = [(one, begin) for one in group for begin in range(0, one.angle.size - window + 1, window // 2)]
-    cuts = [one.torque[0, begin : begin + window] for one, begin in places]
+    places = [(stroke, begin) for stroke in group for begin in range(0, stroke.angle.size - window + 1, window // 2)]
+    cuts = [stroke.torque[0, begin : begin + window] for stroke, begin in places]
     power = np.array([np.abs(np.fft.rfft((cut - cut.mean()) * hann)) ** 2 for cut in cuts])
     noise = _noise(power.mean(axis=0), len(power))
     ratio = power / np.maximum(noise, np.finfo(float).tiny)
-    for row, (one, begin) in enumerate(places):
-        turned = np.abs(np.diff(one.angle[begin : begin + window : window // _SAMPLES_MIN]))
+    for row, (stroke, begin) in enumerate(places):
+        turned = np.abs(np.diff(stroke.angle[begin : begin + window : window // _SAMPLES_MIN]))
         low, high = (f(turned) / (2 * np.pi) * _SAMPLES_MIN for f in (np.min, np.max))  # turns in a window: bins
         for order in orders:
             ratio[row, max(int(low * order - _APART), 0) : int(high * order + _APART) + 2] = np.nan
@@ -131,11 +131,11 @@ def _noise(power: Floats, many: int) -> Floats:
 
 def _peaks(mean: Floats, use: NDArray[np.bool_]) -> list[int]:
     """Highest bins of those that are used, three bins apart."""
-    found = list[int]()
+    peaks = list[int]()
     for k in sorted(np.flatnonzero(use), key=lambda k: -mean[k]):
-        if all(abs(int(k) - other) > 3 for other in found):
-            found.append(int(k))
-    return sorted(found)
+        if all(abs(int(k) - other) > 3 for other in peaks):
+            peaks.append(int(k))
+    return sorted(peaks)
 
 
 def _peak(k: int, mean: Floats, above: Floats, rate_hz: float, window: int) -> tuple[float, float]:

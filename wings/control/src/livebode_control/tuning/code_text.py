@@ -18,7 +18,7 @@ def c_header(biquads: Sequence[Biquad]) -> str:
     /* Filters in series with the velocity controller, 4000 Hz. y = b0 x + b1 x1 + b2 x2 - a1 y1 - a2 y2. */
     """
     rate = f"{biquads[0].rate_hz:g} Hz" if biquads else "none"
-    rows = ",\n".join("    {" + ", ".join(f"{x!r}" for x in (*one.b, *one.a)) + "}" for one in biquads)
+    rows = ",\n".join("    {" + ", ".join(f"{x!r}" for x in (*biquad.b, *biquad.a)) + "}" for biquad in biquads)
     return (
         f"/* Filters in series with the velocity controller, {rate}. y = b0 x + b1 x1 + b2 x2 - a1 y1 - a2 y2. */\n"
         "#ifndef LIVEBODE_FILTERS_H\n#define LIVEBODE_FILTERS_H\n\n"
@@ -44,8 +44,8 @@ def structured_text(biquads: Sequence[Biquad]) -> str:
 
     count = len(biquads)
     body = ["fOut := fIn;"]
-    for i, one in enumerate(biquads):
-        (b0, b1, b2), (a1, a2) = (map(real, part) for part in (one.b, one.a))
+    for i, biquad in enumerate(biquads):
+        (b0, b1, b2), (a1, a2) = (map(real, part) for part in (biquad.b, biquad.a))
         body += [
             f"fX := fOut; fOut := {b0} * fX + fS[{i}, 0];",
             f"fS[{i}, 0] := {b1} * fX - ({a1}) * fOut + fS[{i}, 1];",

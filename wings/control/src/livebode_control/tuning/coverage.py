@@ -49,7 +49,7 @@ def _check_gaps(plant: PlantBand, size: Floats, lines: Lines) -> None:
     wrong = np.any(matters & (plant.coarseness > _GAP_MAX), axis=0)
     if not wrong.any():
         return
-    at = float(plant.frequency_hz[int(np.argmax(np.where(wrong, plant.coarseness.max(axis=0), 0)))])
+    near_hz = float(plant.frequency_hz[int(np.argmax(np.where(wrong, plant.coarseness.max(axis=0), 0)))])
     if lacking := [f for f in plant.dropped_hz.tolist() if _in_gap(plant, wrong, f)]:
         raise TuneError(
             "coherence-low",
@@ -61,9 +61,9 @@ def _check_gaps(plant: PlantBand, size: Floats, lines: Lines) -> None:
     missing = MissingLines.of(lines, _spans(plant, wrong))
     raise TuneError(
         "lines-missing",
-        f"the lines do not resolve the response near {at:.4g} Hz, where the loop is close to −1",
+        f"the lines do not resolve the response near {near_hz:.4g} Hz, where the loop is close to −1",
         missing.remedy,
-        frequency_hz=at,
+        frequency_hz=near_hz,
         lines=missing.lines,
         window=missing.window,
     )
@@ -89,7 +89,7 @@ def _spans(plant: PlantBand, wrong: NDArray[np.bool_]) -> list[_Span]:
             groups[-1].append(gap)
         else:
             groups.append([gap])
-    found = []
+    spans = []
     distance = np.diff(plant.lines_hz)
     for group in groups:
         low, high = float(plant.lines_hz[group[0]]), float(plant.lines_hz[group[-1] + 1])
@@ -97,8 +97,8 @@ def _spans(plant: PlantBand, wrong: NDArray[np.bool_]) -> list[_Span]:
         finer = float(np.ceil((plant.coarseness[:, inside].max() / _GAP_GOOD) ** (1 / 3)))
         # Across a resonance the third difference says too little: at least as fine as beside the gaps.
         beside = distance[max(0, group[0] - 1) : group[-1] + 2].min()
-        found.append((low, high, float(min(distance[group].min() / max(finer, 2.0), beside))))
-    return found
+        spans.append((low, high, float(min(distance[group].min() / max(finer, 2.0), beside))))
+    return spans
 
 
 def _crossover_hz(plant: PlantBand, loop: Complex) -> tuple[float, float]:

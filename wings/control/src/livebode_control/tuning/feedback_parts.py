@@ -49,7 +49,7 @@ class FeedbackParts:
 
     @classmethod
     def of(cls, feedback: Model, frequency_hz: Floats) -> FeedbackParts:
-        """Of a PID, a Cascade or a PositionPD; any other feedback has its described shape and a factor of 1."""
+        """The parts of a PID, Cascade or PositionPD; any other feedback has its described shape and a factor of 1."""
         if isinstance(feedback, PID):
             return cls._of_pid(feedback, frequency_hz)
         if isinstance(feedback, Cascade) and isinstance(feedback.position, PID):

@@ -59,11 +59,11 @@ class Feedforward:
             return cls(inertia, bound)
         wide = dict(zip(friction.names, friction.bound()))
         names = ("viscous", "coulomb", "offset")
-        found = {name: friction[name] for name in names} | {f"{name}_bound": float(wide[name]) for name in names}
-        return cls(inertia, bound, **found, curve=friction)
+        values = {name: friction[name] for name in names} | {f"{name}_bound": float(wide[name]) for name in names}
+        return cls(inertia, bound, **values, curve=friction)
 
     def torque(self, velocity: Floats, acceleration: Floats) -> Floats:
-        """Of the reference at these velocities and accelerations."""
+        """Torque of the reference at these velocities and accelerations."""
         friction = (self.viscous or 0.0) * velocity + (self.coulomb or 0.0) * np.sign(velocity) + (self.offset or 0.0)
         return np.asarray(self.inertia * acceleration + friction)
 
@@ -129,10 +129,10 @@ def rigid_inertia(responses: Responses, kind: str) -> tuple[float, float]:
             "excite lower lines",
             lines=int(goal.size),
         )
-    found, covariance = _least_squares(matrix, goal, np.concatenate(noise), np.concatenate(sizes))
+    solution, covariance = _least_squares(matrix, goal, np.concatenate(noise), np.concatenate(sizes))
     total = np.array([1.0, 1.0, 0.0])
     wide = t_quantile(0.975, goal.size - 3) * np.sqrt(total @ covariance @ total)
-    return float(total @ found), float(wide)
+    return float(total @ solution), float(wide)
 
 
 def _antiresonance_hz(frequency_hz: Floats, size: Floats) -> float:
@@ -150,9 +150,9 @@ def _least_squares(matrix: Floats, goal: Floats, noise: Floats, size: Floats) ->
         weighted = matrix / deviation[:, np.newaxis]
         scale = np.linalg.norm(weighted, axis=0)
         inverse = np.linalg.inv((weighted / scale).T @ (weighted / scale)) / np.outer(scale, scale)
-        found = inverse @ weighted.T @ (goal / deviation)
-        spread = np.sum(((goal - matrix @ found) / deviation) ** 2) / (goal.size - matrix.shape[1])
-        return found, inverse, float(spread)
+        solution = inverse @ weighted.T @ (goal / deviation)
+        spread = np.sum(((goal - matrix @ solution) / deviation) ** 2) / (goal.size - matrix.shape[1])
+        return solution, inverse, float(spread)
 
     low, high = np.log(_SHARE)
     if solved(low)[2] > 1:

@@ -167,8 +167,8 @@ def tuning(
         return _mildest(candidates, kind, rows, loop, band_hz, peak_sensitivity)
 
     notches = (tried(_notches(span, rate_hz), Message("notch")) for span in ranges)
-    found = [p for p in (*notches, tried(_low_passes(ranges[0][1], rate_hz), Message("low-pass"))) if p is not None]
-    better = sorted((p for p in found if largest_ms(p.after) < largest), key=lambda p: largest_ms(p.after))
+    filters = [p for p in (*notches, tried(_low_passes(ranges[0][1], rate_hz), Message("low-pass"))) if p is not None]
+    better = sorted((p for p in filters if largest_ms(p.after) < largest), key=lambda p: largest_ms(p.after))
     if not better:
         return Tuning(
             "refused",
@@ -193,12 +193,12 @@ def tuning(
     return Tuning("suggested", sentence, before, tuple(p for p in better if kinds[p.kind] is p))
 
 
-def largest_ms(found: Margins) -> float:
+def largest_ms(margins: Margins) -> float:
     """Over the rows, with its 95 % bound; infinite where a row is unstable."""
-    if not found.ok.all():
+    if not margins.ok.all():
         return float("inf")
-    at = MARGIN_NAMES.index("peak_sensitivity")
-    return float(np.max(found.value[:, at] + found.bound()[:, at]))
+    index = MARGIN_NAMES.index("peak_sensitivity")
+    return float(np.max(margins.value[:, index] + margins.bound()[:, index]))
 
 
 def _spread(fits: Parameters) -> Parameters:
@@ -225,12 +225,12 @@ def _ranges(rows: Parameters, loop: OpenLoop) -> tuple[list[tuple[float, float, 
     if not names:
         return [], reason
     derived = rows.derived(loop.plant.derived_names, loop.plant.derived_units, loop.plant.derived)
-    found = []
+    modes = []
     for name in names:
         f, sigma = derived[name], derived.sigma[:, derived.index(name)]
         low, high = float(np.min(f - _PLACES * sigma)), float(np.max(f + _PLACES * sigma))
         if low > 0 and high < _WIDEST * low and high < loop.rate_hz / 2:
-            found.append((low, high, float(np.max(derived[f"{name}_damping"]))))
+            modes.append((low, high, float(np.max(derived[f"{name}_damping"]))))
         else:
             reason = Message(
                 "the {quantity} is anywhere from {low:.4g} to {high:.4g} Hz, bound and variation included: too wide "
@@ -239,7 +239,7 @@ def _ranges(rows: Parameters, loop: OpenLoop) -> tuple[list[tuple[float, float, 
                 low=max(low, 0),
                 high=high,
             )
-    return found, reason
+    return modes, reason
 
 
 def _notches(span: tuple[float, float, float], rate_hz: float) -> Iterator[tuple[Biquad, dict[str, float]]]:

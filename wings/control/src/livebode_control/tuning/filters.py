@@ -71,8 +71,8 @@ def notch(frequency_hz: float, depth_db: float, damping: float, rate_hz: float) 
 
     Examples
     --------
-    >>> at = notch(60.0, depth_db=20.0, damping=0.5, rate_hz=4000.0)
-    >>> abs(at.response([0.0, 60.0, 2000.0])).round(6)
+    >>> biquad = notch(60.0, depth_db=20.0, damping=0.5, rate_hz=4000.0)
+    >>> abs(biquad.response([0.0, 60.0, 2000.0])).round(6)
     array([1. , 0.1, 1. ])
     """
     omega, share = 2 * pi * frequency_hz, 10 ** (-depth_db / 20)

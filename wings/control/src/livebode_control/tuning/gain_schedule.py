@@ -73,8 +73,8 @@ class GainSchedule:
             "share": self.share,
             "position": self.position.tolist(),
             **{name: np.exp(column).tolist() for name, column in zip(self.names, self.logarithms.T)},
-            "promised": [one.plain() for one in self.promised],
-            "common_promised": [one.plain() for one in self.common_promised],
+            "promised": [place.plain() for place in self.promised],
+            "common_promised": [place.plain() for place in self.common_promised],
             "reach": self.reach.plain(),
         }
 
@@ -122,22 +122,22 @@ def gain_schedule(
     promised = tuple(_promised(structure, common.plant, x[place], place) for place in places)
     common_promised = tuple(_promised(structure, common.plant, whole, place) for place in places)
     open_loop = np.stack([structure.response(x[place])[0] for place in places]) * common.plant.value
-    reach = PromiseReach.of(common.plant, open_loop, min(one.largest_unknown for one in promised))
+    reach = PromiseReach.of(common.plant, open_loop, min(margins.largest_unknown for margins in promised))
     return GainSchedule(common, position, share, structure.names, x, whole, promised, common_promised, reach)
 
 
 def _structure(common: ControllerProposal) -> FeedbackStructure:
     """The gains of the proposed controller, with its filters as they are."""
-    found = common.feedback
-    return FeedbackStructure(found.controller, common.plant.frequency_hz, fixed=found)
+    feedback = common.feedback
+    return FeedbackStructure(feedback.controller, common.plant.frequency_hz, fixed=feedback)
 
 
 def _alone(common: ControllerProposal, specification: LoopSpecification, place: int, whole: Floats) -> Floats:
     """Logarithms of the gains for a place and its neighbours: the better of two searches, one from the common gains."""
     plant = common.plant.at([i for i in (place - 1, place, place + 1) if 0 <= i < len(common.plant.value)])
     nearby = improved(TuningProblem(_structure(common), plant, specification), whole)
-    found = search(common.loop.feedback, plant, specification, common.feedback)
-    return nearby.x if found is None or found.merit < nearby.merit else found.x
+    result = search(common.loop.feedback, plant, specification, common.feedback)
+    return nearby.x if result is None or result.merit < nearby.merit else result.x
 
 
 def _safest(

@@ -57,13 +57,13 @@ def gains_in(tables: Mapping[str, Any], controller: Model) -> dict[str, float] |
     >>> gains_in({"loop": {"velocity": {"gain": 0.3}}}, pid), gains_in({}, pid)
     ({'gain': 0.3}, None)
     """
-    keys, found = parameter_keys(controller), {}
+    keys, gains = parameter_keys(controller), {}
     for name, described in FeedbackParts.of(controller, np.ones(1)).values.items():
         value = _at(tables, keys.get(name, ""))
         if not (isinstance(value, int | float) and isfinite(value) and value * described > 0):
             return None
-        found[name] = float(value)
-    return found
+        gains[name] = float(value)
+    return gains
 
 
 def _at(tables: object, key: str) -> object:

@@ -117,19 +117,19 @@ class InputShaper:
 
     def taps(self, rate_hz: float) -> Floats:
         """Weights of the samples of a FIR filter, the newest first; an impulse between two ticks is shared by both."""
-        at = np.array(self.times_s) * rate_hz
-        found = np.zeros(int(np.floor(at[-1])) + 2)
-        before = np.floor(at).astype(int)
-        np.add.at(found, before, np.array(self.amplitudes) * (before + 1 - at))
-        np.add.at(found, before + 1, np.array(self.amplitudes) * (at - before))
-        return np.trim_zeros(found, "b")
+        ticks = np.array(self.times_s) * rate_hz
+        taps = np.zeros(int(np.floor(ticks[-1])) + 2)
+        before = np.floor(ticks).astype(int)
+        np.add.at(taps, before, np.array(self.amplitudes) * (before + 1 - ticks))
+        np.add.at(taps, before + 1, np.array(self.amplitudes) * (ticks - before))
+        return np.trim_zeros(taps, "b")
 
 
 def zv(frequency_hz: float, damping: float = 0.0) -> InputShaper:
     """Two impulses with no residual vibration of the mode (Singer and Seering 1990).
 
-    >>> one = zv(50.0)
-    >>> one.times_s, one.amplitudes, bool(one.residual(50.0, 0.0) < 1e-12)
+    >>> shaper = zv(50.0)
+    >>> shaper.times_s, shaper.amplitudes, bool(shaper.residual(50.0, 0.0) < 1e-12)
     ((0.0, 0.01), (0.5, 0.5), True)
     """
     return _half_periods("zv", (1, 1), frequency_hz, damping)
@@ -185,9 +185,9 @@ def optimised(mode: ModeRange, tolerance: float = TOLERANCE) -> InputShaper:
     low, high = 1, most
     while high - low > 1:
         middle = (low + high) // 2
-        found = _program(mode, middle, step_s)
-        if found.worst <= tolerance:
-            high, best = middle, found
+        candidate = _program(mode, middle, step_s)
+        if candidate.worst <= tolerance:
+            high, best = middle, candidate
         else:
             low = middle
     return best
@@ -208,16 +208,16 @@ def shapers(mode: ModeRange, tolerance: float = TOLERANCE) -> tuple[InputShaper,
             "out-of-range", f"tolerance={tolerance} is not between 0 and 1", "0.05 is usual", argument="tolerance",
             value=tolerance,
         )  # fmt: skip
-    found = [_best_placed(kind, mode) for kind in KINDS.values()]
+    candidates = [_best_placed(kind, mode) for kind in KINDS.values()]
     with suppress(TuneError):  # the range is too wide: the residuals of the others show how much remains
-        found.append(optimised(mode, tolerance))
-    return tuple(sorted(found, key=lambda one: one.duration_s))
+        candidates.append(optimised(mode, tolerance))
+    return tuple(sorted(candidates, key=lambda shaper: shaper.duration_s))
 
 
-def chosen(found: tuple[InputShaper, ...], tolerance: float = TOLERANCE) -> InputShaper:
+def chosen(candidates: tuple[InputShaper, ...], tolerance: float = TOLERANCE) -> InputShaper:
     """The shortest that keeps the tolerance; where none does, the one with the least residual."""
-    good = [one for one in found if one.worst <= tolerance * (1 + _NEGLIGIBLE)]
-    return good[0] if good else min(found, key=lambda one: one.worst)
+    good = [shaper for shaper in candidates if shaper.worst <= tolerance * (1 + _NEGLIGIBLE)]
+    return good[0] if good else min(candidates, key=lambda shaper: shaper.worst)
 
 
 def _half_periods(kind: str, weights: tuple[float, ...], frequency_hz: float, damping: float) -> InputShaper:
@@ -261,7 +261,7 @@ def _program(mode: ModeRange, steps: int, step_s: float) -> InputShaper:
     phasors = _phasors(times_s, *mode.grid)
     turns = np.exp(1j * np.pi * np.arange(_TURNS) * 2 / _TURNS)
     rows = np.real(phasors[np.newaxis] * turns[:, np.newaxis, np.newaxis]).reshape(-1, times_s.size)
-    found = linprog(
+    solution = linprog(
         np.append(np.zeros(times_s.size), 1.0),
         A_ub=np.column_stack([rows, -np.ones(len(rows))]),
         b_ub=np.zeros(len(rows)),
@@ -269,8 +269,8 @@ def _program(mode: ModeRange, steps: int, step_s: float) -> InputShaper:
         b_eq=[1.0],
         method="highs",
     )
-    every = np.asarray(found.x, dtype=np.float64)[:-1]
+    every = np.asarray(solution.x, dtype=np.float64)[:-1]
     use = every > _NEGLIGIBLE
     amplitudes = every[use] / every[use].sum()
-    at = times_s[use] - times_s[use][0]
-    return _largest(InputShaper("optimised", tuple(at.tolist()), tuple(amplitudes.tolist()), *mode.middle), mode)
+    times = times_s[use] - times_s[use][0]
+    return _largest(InputShaper("optimised", tuple(times.tolist()), tuple(amplitudes.tolist()), *mode.middle), mode)

@@ -80,14 +80,14 @@ def _text(bins: list[int], window: int, rate_hz: float) -> tuple[str, int | None
 def _runs(bins: list[int]) -> list[range]:
     """The bins as runs with equal steps, each as long as it can be."""
     runs: list[range] = []
-    at = 0
-    while at < len(bins):
-        step = bins[at + 1] - bins[at] if at + 1 < len(bins) else 1
-        end = at + 1
+    position = 0
+    while position < len(bins):
+        step = bins[position + 1] - bins[position] if position + 1 < len(bins) else 1
+        end = position + 1
         while end < len(bins) and bins[end] - bins[end - 1] == step:
             end += 1
-        runs.append(range(bins[at], bins[end - 1] + 1, step))
-        at = end
+        runs.append(range(bins[position], bins[end - 1] + 1, step))
+        position = end
     return runs
 
 

@@ -93,14 +93,14 @@ class ModalFit:
 
     @classmethod
     def of(cls, lines_hz: Floats, value: Complex, sigma: Floats, rate_hz: float) -> ModalFit:
-        """Of one place, shape (lines,)."""
+        """The fit of one place, values of shape (lines,)."""
         outputs: tuple[Output, ...] = ("velocity", "differenced", "position")
         use = lines_hz >= min(lines_hz[-1] / 2**_OCTAVES, lines_hz[-min(_LINES_MIN, lines_hz.size)])
         f, octaves = lines_hz[use], np.log2(rate_hz / lines_hz[use][0])
         tried = _Modes.of(f, f[0] / 2 * 2 ** (np.arange(int(octaves * _PER_OCTAVE)) / _PER_OCTAVE))
         least = np.full(_MODES_MAX + 1, np.inf)
         fits = [cls._begun(f, value[use], sigma[use], rate_hz, output, tried)._grown(least) for output in outputs]
-        return min(fits, key=lambda one: one.chi2 + _PRICE * len(one.modes))
+        return min(fits, key=lambda fit: fit.chi2 + _PRICE * len(fit.modes))
 
     @classmethod
     def _begun(
@@ -144,8 +144,8 @@ class ModalFit:
 
     @property
     def chi2(self) -> float:
-        rest = self._solution[1]
-        return float(rest @ rest)
+        residual = self._solution[1]
+        return float(residual @ residual)
 
     @property
     def excess(self) -> float:
@@ -171,12 +171,12 @@ class ModalFit:
         def slopes(theta: Floats) -> Floats:
             return at(theta.tobytes())._residual_slopes
 
-        found = least_squares(residual, start, slopes, bounds=(low, high), max_nfev=_EVALUATIONS, ftol=_CHANGE)
-        return self._with(np.asarray(found.x))
+        solution = least_squares(residual, start, slopes, bounds=(low, high), max_nfev=_EVALUATIONS, ftol=_CHANGE)
+        return self._with(np.asarray(solution.x))
 
     @property
     def _residual_slopes(self) -> Floats:
-        """Of the weighted residual by theta, as the weights of the columns follow it (Kaufman 1975, BIT 15)."""
+        """Slopes of the weighted residual by theta, which the weights of the columns follow (Kaufman 1975, BIT 15)."""
         slopes, linear = self._stacked(self._slopes(self.frequency_hz)), self._solution[0].size
         q = np.linalg.qr(slopes[:, :linear])[0]
         return np.asarray(q @ (q.T @ slopes[:, linear:]) - slopes[:, linear:])
@@ -288,8 +288,10 @@ class ModalFit:
 def _rigid(frequency_hz: Floats, rate_hz: float, output: Output) -> Complex:
     """Inertia one behind a hold, but for its delay."""
     half = np.pi * frequency_hz / rate_hz
-    one = 1 / (2j * rate_hz * np.sin(half))
-    return np.asarray(one if output == "velocity" else np.cos(half) * one ** (2 if output == "position" else 1))
+    integrator = 1 / (2j * rate_hz * np.sin(half))
+    return np.asarray(
+        integrator if output == "velocity" else np.cos(half) * integrator ** (2 if output == "position" else 1)
+    )
 
 
 def _mode(frequency_hz: Floats, mode_hz: Floats | float, damping: Floats | float) -> Complex:

@@ -118,35 +118,35 @@ class PlantBand:
         return float(shown.min()) if shown.size else None
 
     def without_modes_above(self) -> PlantBand:
-        """The same if it fell above the lines as they predict."""
+        """This plant if it fell above the lines as they predict."""
         return replace(self, rise=np.ones_like(self.rise))
 
     def only(self, columns: NDArray[np.bool_]) -> PlantBand:
-        """The same at some of the frequencies."""
+        """This plant at some of its frequencies."""
         named = ("frequency_hz", "value", "radius", "measured", "above", "rise", "spread", "coarseness", "sigma")
         return replace(self, **{name: getattr(self, name)[..., columns] for name in named})
 
     def at(self, places: Sequence[int]) -> PlantBand:
-        """The same at some of the places."""
+        """This plant at some of its places."""
         named = ("value", "radius", "rise", "shown_hz", "spread", "coarseness", "sigma")
         return replace(self, **{name: getattr(self, name)[places] for name in named})
 
     @classmethod
     def at_lines(cls, lines_hz: Floats, value: Complex, radius: Floats, sigma: Floats, rate_hz: float) -> PlantBand:
-        """The same from a radius at each line; shapes (lines,) and (places, lines)."""
+        """The plant between its lines and above, from a radius at each line; shapes (lines,) and (places, lines)."""
         modes = [ModalFit.of(lines_hz, row, noise, rate_hz) for row, noise in zip(value, sigma)]
-        inside, share, left = _refined(lines_hz, np.concatenate([one.narrow(lines_hz) for one in modes]))
+        inside, share, left = _refined(lines_hz, np.concatenate([mode.narrow(lines_hz) for mode in modes]))
         middle, gap, coarse = _between(lines_hz, value, radius, inside, left)
         mixed = (1 - share) * radius[:, left] + share * radius[:, left + 1]
         deviation = (1 - share) * sigma[:, left] + share * sigma[:, left + 1]
         for row, fit in enumerate(modes):
-            at = _near(fit.narrow(lines_hz), inside) & ~np.isin(inside, lines_hz)
-            if at.any():
-                model = _by_model(fit, lines_hz, value[row], inside[at], left[at])
-                scale = np.abs(model[0] / middle[row, at])
-                mixed[row, at] *= scale
-                deviation[row, at] *= scale
-                middle[row, at], gap[row, at], coarse[row, at] = model
+            between = _near(fit.narrow(lines_hz), inside) & ~np.isin(inside, lines_hz)
+            if between.any():
+                model = _by_model(fit, lines_hz, value[row], inside[between], left[between])
+                scale = np.abs(model[0] / middle[row, between])
+                mixed[row, between] *= scale
+                deviation[row, between] *= scale
+                middle[row, between], gap[row, between], coarse[row, between] = model
         low = np.geomspace(_LOWEST * lines_hz[0], lines_hz[0], int(-np.log10(_LOWEST) * _PER_DECADE), endpoint=False)
         high = np.geomspace(_NEXT * lines_hz[-1], rate_hz / 2, _ABOVE)
         parts = [low, inside, high]
@@ -157,7 +157,7 @@ class PlantBand:
 
         order = np.clip(np.rint(-np.angle(value[:, :1]) / (np.pi / 2)), 0, 2)
         below = (lines_hz[0] / low) ** order
-        fall, rise = (np.stack(part) for part in zip(*(one.above(high) for one in modes)))
+        fall, rise = (np.stack(part) for part in zip(*(mode.above(high) for mode in modes)))
         interpolation = np.abs(middle) * gap
         zero = np.zeros(1)
         count = [p.size for p in parts]
@@ -168,7 +168,7 @@ class PlantBand:
             measured=np.concatenate([np.zeros(count[0], bool), np.isin(inside, lines_hz), np.zeros(count[2], bool)]),
             above=np.repeat([False, False, True], count),
             rise=joined(np.ones(1), np.ones(1), rise).astype(np.float64),
-            shown_hz=np.array([one.shown_hz for one in modes]),
+            shown_hz=np.array([mode.shown_hz for mode in modes]),
             spread=joined(zero, gap, zero).astype(np.float64),
             coarseness=joined(zero, coarse, zero).astype(np.float64),
             sigma=joined(sigma[:, :1] * below, deviation, zero).astype(np.float64),
@@ -186,22 +186,22 @@ def _refined(lines_hz: Floats, narrow: Floats) -> tuple[Floats, Floats, NDArray[
     near = _near(narrow, lines_hz[:-1])
     dense = lines_hz[:-1][near, np.newaxis] + np.diff(lines_hz)[near, np.newaxis] * finer
     around = np.append((narrow[:, :1] + narrow[:, 1:] * _WIDTHS).ravel(), dense)
-    at = np.unique(np.concatenate([lines_hz, *between, around.ravel()]))
-    at = at[(at >= lines_hz[0]) & (at <= lines_hz[-1])]
-    left = np.clip(np.searchsorted(lines_hz, at, side="right") - 1, 0, lines_hz.size - 2)
-    return at, _share(lines_hz, at, left), left
+    grid_hz = np.unique(np.concatenate([lines_hz, *between, around.ravel()]))
+    grid_hz = grid_hz[(grid_hz >= lines_hz[0]) & (grid_hz <= lines_hz[-1])]
+    left = np.clip(np.searchsorted(lines_hz, grid_hz, side="right") - 1, 0, lines_hz.size - 2)
+    return grid_hz, _share(lines_hz, grid_hz, left), left
 
 
 def _between(
-    lines_hz: Floats, value: Complex, radius: Floats, at: Floats, left: NDArray[np.int64]
+    lines_hz: Floats, value: Complex, radius: Floats, f: Floats, left: NDArray[np.int64]
 ) -> tuple[Complex, Floats, Floats]:
     """G at the frequencies, half the difference of its parabolas as a share of |G|, and that of log G.
 
     Shape (places, frequencies).
     """
     log = np.log(np.abs(value)) + 1j * np.unwrap(np.angle(value), axis=1)
-    share = _share(lines_hz, at, left)
-    parabolas = [_parabolas(lines_hz, transformed, at, left) for transformed in (log, value, 1 / value)]
+    share = _share(lines_hz, f, left)
+    parabolas = [_parabolas(lines_hz, transformed, f, left) for transformed in (log, value, 1 / value)]
     backs: list[Callable[[Complex], Complex]] = [np.exp, np.asarray, np.reciprocal]
     middles, gaps = [], []
     for (before, after), back in zip(parabolas, backs):
@@ -218,41 +218,41 @@ def _between(
     noisy = np.maximum.reduceat(coarse, starts, axis=1) <= _NOISE * np.maximum(noise[:, :-1], noise[:, 1:])
     least = np.where(noisy[:, left], 0, least)
     middle, gap = (np.take_along_axis(np.array(of), least[np.newaxis], 0)[0] for of in (middles, gaps))
-    on_line = np.isin(at, lines_hz)
+    on_line = np.isin(f, lines_hz)
     gap[:, on_line] = coarse[:, on_line] = 0.0
     return middle, gap, coarse
 
 
-def cubic(lines_hz: Floats, values: Complex, at: Floats) -> Complex:
+def cubic(lines_hz: Floats, values: Complex, f: Floats) -> Complex:
     """Values of the lines, shape (rows, lines), between them by the cubic through four; beyond them constant."""
-    within = np.clip(at, lines_hz[0], lines_hz[-1])
+    within = np.clip(f, lines_hz[0], lines_hz[-1])
     left = np.clip(np.searchsorted(lines_hz, within, side="right") - 1, 0, lines_hz.size - 2)
     share = _share(lines_hz, within, left)
     before, after = _parabolas(lines_hz, values, within, left)
     return np.asarray((1 - share) * before + share * after)
 
 
-def _near(narrow: Floats, at: Floats) -> NDArray[np.bool_]:
+def _near(narrow: Floats, f: Floats) -> NDArray[np.bool_]:
     """Which points are within two octaves of a narrow mode, as is its antiresonance up to an inertia ratio of 15."""
-    return np.asarray((np.abs(np.log2(at[:, np.newaxis] / narrow[:, 0])) <= 2).any(axis=1))
+    return np.asarray((np.abs(np.log2(f[:, np.newaxis] / narrow[:, 0])) <= 2).any(axis=1))
 
 
 def _by_model(
-    fit: ModalFit, lines_hz: Floats, value: Complex, at: Floats, left: NDArray[np.int64]
+    fit: ModalFit, lines_hz: Floats, value: Complex, f: Floats, left: NDArray[np.int64]
 ) -> tuple[Complex, Floats, Floats]:
-    """As `_between`, of the ratio of the measured to the fitted response, with the bound of the latter."""
+    """Values as of `_between`, by the ratio of the measured to the fitted response, with the bound of the latter."""
     ratio = (value / fit.response(lines_hz))[np.newaxis]
-    before, after = (one[0] for one in _parabolas(lines_hz, ratio, at, left))
-    share = _share(lines_hz, at, left)
+    before, after = (parabola[0] for parabola in _parabolas(lines_hz, ratio, f, left))
+    share = _share(lines_hz, f, left)
     middle = (1 - share) * before + share * after
-    model = fit.response(at)
-    gap = np.abs(before - after) / np.abs(middle) / 2 + _FITTED * fit.sigma(at) / np.abs(model)
+    model = fit.response(f)
+    gap = np.abs(before - after) / np.abs(middle) / 2 + _FITTED * fit.sigma(f) / np.abs(model)
     return model * middle, gap, gap
 
 
-def _share(lines_hz: Floats, at: Floats, left: NDArray[np.int64]) -> Floats:
-    """Of the way from the line before to the next one."""
-    return np.asarray((at - lines_hz[left]) / (lines_hz[left + 1] - lines_hz[left]))
+def _share(lines_hz: Floats, f: Floats, left: NDArray[np.int64]) -> Floats:
+    """Share of the way from the line before to the next one."""
+    return np.asarray((f - lines_hz[left]) / (lines_hz[left + 1] - lines_hz[left]))
 
 
 def _to_ends(gap: Floats, share: Floats, left: NDArray[np.int64]) -> Floats:
@@ -264,17 +264,17 @@ def _to_ends(gap: Floats, share: Floats, left: NDArray[np.int64]) -> Floats:
     return gap
 
 
-def _parabolas(lines_hz: Floats, values: Complex, at: Floats, left: NDArray[np.int64]) -> tuple[Complex, Complex]:
+def _parabolas(lines_hz: Floats, values: Complex, f: Floats, left: NDArray[np.int64]) -> tuple[Complex, Complex]:
     """Through the line before each gap, and through the line after it."""
-    before, after = (_parabola(lines_hz, values, at, np.clip(left - i, 0, lines_hz.size - 3)) for i in (1, 0))
+    before, after = (_parabola(lines_hz, values, f, np.clip(left - i, 0, lines_hz.size - 3)) for i in (1, 0))
     return before, after
 
 
-def _parabola(lines_hz: Floats, values: Complex, at: Floats, first: NDArray[np.int64]) -> Complex:
+def _parabola(lines_hz: Floats, values: Complex, f: Floats, first: NDArray[np.int64]) -> Complex:
     """Through three lines from `first` on (Lagrange)."""
     x = [lines_hz[first + i] for i in range(3)]
-    total = np.zeros((len(values), at.size), dtype=np.complex128)
+    total = np.zeros((len(values), f.size), dtype=np.complex128)
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
-        total += values[:, first + i] * ((at - x[j]) * (at - x[k]) / ((x[i] - x[j]) * (x[i] - x[k])))
+        total += values[:, first + i] * ((f - x[j]) * (f - x[k]) / ((x[i] - x[j]) * (x[i] - x[k])))
     return total

@@ -32,7 +32,7 @@ class PredictedMargins:
     bandwidth_hz: float
 
     def with_unknown(self, largest: float) -> PredictedMargins:
-        """The same if |L| is up to `largest` with any phase at other frequencies."""
+        """Margins if |L| is up to `largest` with any phase at other frequencies."""
         size = min(largest, 1.0)
         return replace(
             self,
@@ -67,17 +67,17 @@ def disk_margin(loop: ArrayLike) -> float:
     >>> round(disk_margin([-2j, -1j, -0.5]), 6)
     0.666667
     """
-    at = np.asarray(loop, dtype=np.complex128)
+    values = np.asarray(loop, dtype=np.complex128)
     with np.errstate(divide="ignore", invalid="ignore"):
-        return float(np.nanmin(2 * np.abs(1 + at) / np.abs(1 - at)))
+        return float(np.nanmin(2 * np.abs(1 + values) / np.abs(1 - values)))
 
 
 def predicted(frequency_hz: Floats, loop: Complex, radius: Floats) -> PredictedMargins:
     """Margins of L, shape (places, frequencies), for the worst point of the disc around each point."""
-    one = loop.ravel()
+    values = loop.ravel()
     size = radius.ravel()
-    edge = one[:, np.newaxis] + size[:, np.newaxis] * np.exp(2j * np.pi * np.arange(_POINTS) / _POINTS)
-    nearest = np.abs(1 + one) - size
+    edge = values[:, np.newaxis] + size[:, np.newaxis] * np.exp(2j * np.pi * np.arange(_POINTS) / _POINTS)
+    nearest = np.abs(1 + values) - size
     sensitivity = float(np.max(1 / np.maximum(nearest, 1e-12)))
     closed = np.abs(loop / (1 + loop)) if not size.any() else _closed_least(loop, radius)
     return PredictedMargins(
@@ -102,12 +102,12 @@ def gain_margin_db(loop: Complex, radius: Floats) -> float:
     reach = radius**2 - loop.imag**2
     touching = (reach >= 0) & (loop.real < 0)
     left = loop.real[touching] - np.sqrt(reach[touching])
-    one, two = loop[:-1], loop[1:]
-    crossing = (one.imag * two.imag < 0) & (np.minimum(one.real, two.real) < 0)
-    share = one.imag[crossing] / (one.imag[crossing] - two.imag[crossing])
-    at = one.real[crossing] + share * (two.real[crossing] - one.real[crossing])
-    at = at - (radius[:-1][crossing] * (1 - share) + radius[1:][crossing] * share)
-    every = np.concatenate([left, at])
+    first, second = loop[:-1], loop[1:]
+    crossing = (first.imag * second.imag < 0) & (np.minimum(first.real, second.real) < 0)
+    share = first.imag[crossing] / (first.imag[crossing] - second.imag[crossing])
+    crossings = first.real[crossing] + share * (second.real[crossing] - first.real[crossing])
+    crossings = crossings - (radius[:-1][crossing] * (1 - share) + radius[1:][crossing] * share)
+    every = np.concatenate([left, crossings])
     nearer = every[(every > -1) & (every < 0)]
     return float(-20 * np.log10(-nearer.min())) if nearer.size else float("inf")
 
@@ -118,12 +118,12 @@ def phase_margin_deg(loop: Complex, radius: Floats) -> float:
     reaching = (np.abs(size - 1) <= radius) & (size > 0)
     half = np.arccos(np.clip((1 + size[reaching] ** 2 - radius[reaching] ** 2) / (2 * size[reaching]), -1, 1))
     from_discs = np.abs(np.angle(-loop[reaching])) - half
-    one, two = size[:-1] - 1, size[1:] - 1
-    crossing = one * two < 0
-    share = one[crossing] / (one[crossing] - two[crossing])
-    at = loop[:-1][crossing] * (loop[1:] / loop[:-1])[crossing] ** share
+    first, second = size[:-1] - 1, size[1:] - 1
+    crossing = first * second < 0
+    share = first[crossing] / (first[crossing] - second[crossing])
+    crossings = loop[:-1][crossing] * (loop[1:] / loop[:-1])[crossing] ** share
     wide = np.arcsin(np.clip(radius[:-1][crossing] * (1 - share) + radius[1:][crossing] * share, 0, 1))
-    every = np.concatenate([from_discs, np.abs(np.angle(-at)) - wide])
+    every = np.concatenate([from_discs, np.abs(np.angle(-crossings)) - wide])
     return float(np.degrees(every.min())) if every.size else float("inf")
 
 

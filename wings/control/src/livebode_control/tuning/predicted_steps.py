@@ -1,4 +1,4 @@
-"""The steps that a loop is predicted to make, with bands from the bounds of the plant."""
+"""The steps that a loop is predicted to make, from frequency responses, with bands from the bounds of the plant."""
 
 from __future__ import annotations
 
@@ -10,7 +10,51 @@ import numpy as np
 from livebode.arrays import Complex, Floats
 from livebode.core import Model, integral
 from livebode_control.tuning.plant_band import PlantBand, cubic
-from livebode_control.tuning.step_response import step_response
+
+_PER_OCTAVE = 20
+
+
+def step_response(frequency_hz: Floats, response: Complex, time_s: Floats) -> Floats:
+    """The response of a stable system to a unit step at 0: (2/π)·∫ Re G(ω)·sin(ωt)/ω dω; shape (rows, times).
+
+    Exact for a real part that is linear between the frequencies (with the sine integral), constant below the first and
+    zero above the last.
+
+    Parameters
+    ----------
+    frequency_hz
+        Ascending; the first far below 1/time.
+    response
+        Shape (rows, frequencies).
+    time_s
+        Positive times, shape (times,).
+
+    Examples
+    --------
+    >>> f = np.geomspace(1e-4, 1e4, 400)
+    >>> lag = 1 / (1 + 2j * np.pi * f[np.newaxis] * 0.1)
+    >>> step_response(f, lag, np.array([0.1, 0.3])).round(2)
+    array([[0.63, 0.95]])
+    """
+    from scipy.special import sici
+
+    f = np.union1d(frequency_hz, _even(frequency_hz))
+    real = np.stack([np.interp(np.log(f), np.log(frequency_hz), row.real) for row in response])
+    omega = 2 * np.pi * f
+    slope = np.diff(real) / np.diff(omega)
+    start = real[:, :-1] - slope * omega[:-1]
+    turned = np.outer(omega, time_s)
+    sine = sici(turned)[0]
+    cosine = np.cos(turned) / np.maximum(time_s, 1e-300)
+    area = real[:, :1] * sine[0] + start @ np.diff(sine, axis=0) - slope @ np.diff(cosine, axis=0)
+    return np.asarray(2 / np.pi * area)
+
+
+def _even(frequency_hz: Floats) -> Floats:
+    """Frequencies of an even logarithmic grid over the same range."""
+    count = int(np.log2(frequency_hz[-1] / frequency_hz[0]) * _PER_OCTAVE)
+    return np.geomspace(frequency_hz[0], frequency_hz[-1], count)[1:-1]
+
 
 _DRAWS = 100  # of the plant
 _BAND = (0.025, 0.975)
@@ -27,9 +71,9 @@ class PredictedStep:
 
     @classmethod
     def over(cls, steps: Sequence[PredictedStep]) -> PredictedStep:
-        """Of several places at the same times: the hull of their bands."""
-        value = np.concatenate([one.value for one in steps])
-        low, high = np.min([one.low for one in steps], axis=0), np.max([one.high for one in steps], axis=0)
+        """The step of several places at the same times: the hull of their bands."""
+        value = np.concatenate([step.value for step in steps])
+        low, high = np.min([step.low for step in steps], axis=0), np.max([step.high for step in steps], axis=0)
         return cls(steps[0].time_s, value, low, high)
 
 

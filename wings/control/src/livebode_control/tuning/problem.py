@@ -10,11 +10,83 @@ from numpy.typing import NDArray
 
 from livebode.analysis import stable
 from livebode.arrays import Complex, Floats
-from livebode_control.tuning.clearance import ForbiddenRegion
 from livebode_control.tuning.plant_band import PlantBand
 from livebode_control.tuning.predicted import gain_margin_db, phase_margin_deg
 from livebode_control.tuning.specification import LoopSpecification
 from livebode_control.tuning.structure import FeedbackStructure
+
+_HALF_WIDTH = 0.04  # of segment and arc, so that the curve cannot pass them between two points unseen
+
+
+@dataclass(frozen=True)
+class ForbiddenRegion:
+    """The points of the Nyquist plane where L may not be; all contain −1.
+
+    Attributes
+    ----------
+    sensitivity_radius
+        1/Ms, around −1.
+    disk
+        Centre on the real axis and radius of the disk margin; None without one.
+    gain
+        The segment from −1 to −1/gain.
+    phase_rad
+        The arc of the unit circle around −1, to both sides.
+    """
+
+    sensitivity_radius: float
+    disk: tuple[float, float] | None
+    gain: float
+    phase_rad: float
+
+    @classmethod
+    def of(cls, specification: LoopSpecification) -> ForbiddenRegion:
+        """The region of a specification.
+
+        |S − 1/2| < 1/α outside of the disk with diameter from −(2 + α)/(2 − α) to −(2 − α)/(2 + α) (Seiler, Packard
+        and Gahinet, An introduction to disk margins, IEEE Control Systems 40(5), 2020).
+        """
+        alpha, disk = specification.disk_margin, None
+        if alpha > 0:
+            far, near = (2 + alpha) / (2 - alpha), (2 - alpha) / (2 + alpha)
+            disk = -(far + near) / 2, (far - near) / 2
+        gain = 10 ** (specification.gain_margin_db / 20)
+        return cls(1 / specification.max_sensitivity, disk, gain, np.radians(specification.phase_margin_deg))
+
+    def clearance(self, loop: Complex) -> tuple[Floats, Complex]:
+        """Distance to the region (negative within a disk), and the unit vector that points away from it."""
+        aways, radii = zip(*self._each(loop))
+        away = np.stack(aways)
+        size = np.maximum(np.abs(away), 1e-300)
+        distance = size - np.array(radii).reshape(-1, *[1] * loop.ndim)
+        nearest = np.argmin(distance, axis=0)[np.newaxis]
+        return (
+            np.take_along_axis(distance, nearest, 0)[0],
+            np.take_along_axis(away / size, nearest, 0)[0],
+        )
+
+    def distance(self, loop: Complex) -> Floats:
+        """Distance to the region, negative within a disk."""
+        return np.asarray(np.min([np.abs(away) - radius for away, radius in self._each(loop)], axis=0))
+
+    def nearest(self, point: complex) -> str:
+        """The limit that a point is nearest to, for people."""
+        names = ["limit of Ms", *["disk margin"] * (self.disk is not None), "gain margin", "phase margin"]
+        distances = [abs(away[0]) - radius for away, radius in self._each(np.array([point]))]
+        return names[int(np.argmin(distances))]
+
+    def _each(self, loop: Complex) -> list[tuple[Complex, float]]:
+        """The vector from the nearest centre, and the radius around it, for each part of the region."""
+        distances = [(loop + 1.0, self.sensitivity_radius)]
+        if self.disk is not None:
+            distances.append((loop - self.disk[0], self.disk[1]))
+        on_segment = np.clip(loop.real, -1.0, max(-1 / self.gain - _HALF_WIDTH, -1.0))
+        distances.append((loop - on_segment, _HALF_WIDTH))
+        half = max(self.phase_rad - _HALF_WIDTH, 0.0)
+        on_arc = -np.exp(1j * np.clip(np.angle(-loop), -half, half))
+        distances.append((loop - on_arc, _HALF_WIDTH))
+        return distances
+
 
 _HALF_POWER = 0.708  # −3 dB
 _ROUNDING = 1e-3  # dB and degrees
@@ -73,7 +145,7 @@ class TuningProblem:
         return value / scale, np.moveaxis(derivative, 0, -1)
 
     def only(self, columns: NDArray[np.bool_]) -> TuningProblem:
-        """The same at some frequencies: for clearances, which need no neighbours."""
+        """This problem at some frequencies: for clearances, which need no neighbours."""
         plant = self.plant.only(columns)
         return replace(self, structure=self.structure.only(columns), plant=plant)
 
@@ -109,9 +181,9 @@ class TuningProblem:
         bandwidth = self.specification.bandwidth_hz
         assert bandwidth is not None
         f, slopes = self.structure.response(x)
-        at = (self.plant.frequency_hz <= bandwidth) & (self.plant.frequency_hz > bandwidth / 4)
-        loop, slope = self.plant.value[:, at] * f[at], slopes.T[at]
-        radius = self.plant.radius[:, at] * np.abs(f[at])
+        below = (self.plant.frequency_hz <= bandwidth) & (self.plant.frequency_hz > bandwidth / 4)
+        loop, slope = self.plant.value[:, below] * f[below], slopes.T[below]
+        radius = self.plant.radius[:, below] * np.abs(f[below])
         away = np.abs(1 + loop)
         value = np.abs(loop) - radius - _HALF_POWER * (away + radius)
         derivative = (np.abs(loop) - (1 + _HALF_POWER) * radius)[..., np.newaxis] * slope.real
@@ -124,13 +196,13 @@ class TuningProblem:
 
     def _between_points(self, behind: Complex) -> bool:
         """Whether gain and phase margin are kept where the curve crosses axis and unit circle between two points."""
-        at = ~self.plant.above
-        f = behind[at]
-        radius = self.plant.radius[:, at] * np.abs(f)
+        inside = ~self.plant.above
+        f = behind[inside]
+        radius = self.plant.radius[:, inside] * np.abs(f)
         return all(
             gain_margin_db(row, r) >= self.specification.gain_margin_db - _ROUNDING
             and phase_margin_deg(row, r) >= self.specification.phase_margin_deg - _ROUNDING
-            for row, r in zip(self.plant.value[:, at] * f, radius)
+            for row, r in zip(self.plant.value[:, inside] * f, radius)
         )
 
     def feasible(self, x: Floats, tolerance: float = 1e-6) -> bool:

@@ -105,7 +105,8 @@ class ControllerProposal:
             ],
             "low_passes_hz": list(self.feedback.low_passes),
             "biquads": [
-                {"rate_hz": one.rate_hz, "b": list(one.b), "a": [1.0, *one.a]} for one in self.feedback.biquads
+                {"rate_hz": biquad.rate_hz, "b": list(biquad.b), "a": [1.0, *biquad.a]}
+                for biquad in self.feedback.biquads
             ],
             "before": _margins(self.before),
             "before_worst": _margins(self.before_worst),
@@ -164,15 +165,15 @@ def tune(
     >>> plant = np.atleast_2d(belt.at(values, EvaluationGrid.of(lines)))
     >>> ones, row = np.ones(plant.shape), np.zeros(1, dtype=int)
     >>> exact = Responses(lines, plant, 0 * ones, row + np.inf, ones, ones > 0, row, row, row + 0.0, row + 0.0)
-    >>> found = tune(exact, Loop(PID(gain=0.2, integral_time_s=0.2, rate_hz=4000, delay_ticks=4)), loop_checked=True)
-    >>> found.met, found.promised.max_sensitivity <= 2.001
+    >>> proposal = tune(exact, Loop(PID(gain=0.2, integral_time_s=0.2, rate_hz=4000, delay_ticks=4)), loop_checked=True)
+    >>> proposal.met, proposal.promised.max_sensitivity <= 2.001
     (True, True)
     """
     if not loop_checked:
         raise TuneError(
             "loop-unchecked",
             "it was not checked that the described controllers are those of the machine",
-            "compare them with the recording: livebode check-loop",
+            "compare them with the recording: livebode validate --loop",
             argument="loop_checked",
         )
     asked = specification or LoopSpecification()
@@ -205,16 +206,16 @@ def tune(
 
 def _best(controller: Model | None, plant: PlantBand, asked: LoopSpecification) -> SearchResult | None:
     """The most robust controller with the required bandwidth; where there is none, the fastest."""
-    found = search(controller, plant, asked)
+    result = search(controller, plant, asked)
     if asked.bandwidth_hz is None:
-        return found
-    if found is not None and _promises(found, plant, asked.bandwidth_hz):
-        return found
+        return result
+    if result is not None and _promises(result, plant, asked.bandwidth_hz):
+        return result
     return search(controller, plant, replace(asked, bandwidth_hz=None))
 
 
-def _promises(found: SearchResult, plant: PlantBand, bandwidth_hz: float) -> bool:
-    feedback = found.problem.structure.feedback(found.x)
+def _promises(result: SearchResult, plant: PlantBand, bandwidth_hz: float) -> bool:
+    feedback = result.problem.structure.feedback(result.x)
     return margins_of(plant, feedback.model, 1.0).bandwidth_hz >= _REACHED * bandwidth_hz
 
 
@@ -223,10 +224,10 @@ def margins_of(plant: PlantBand, feedback: Model, share: float) -> PredictedMarg
 
     With a share also above the highest line, where only the largest |L| is known.
     """
-    behind, at = feedback.response(plant.frequency_hz), ~plant.above
+    behind, known = feedback.response(plant.frequency_hz), ~plant.above
     loop, radius = plant.value * behind, share * plant.radius * np.abs(behind)
-    found = predicted(plant.frequency_hz[at], loop[:, at], radius[:, at])
-    return found.with_unknown(float((plant.rise * np.abs(loop))[:, plant.above].max())) if share else found
+    margins = predicted(plant.frequency_hz[known], loop[:, known], radius[:, known])
+    return margins.with_unknown(float((plant.rise * np.abs(loop))[:, plant.above].max())) if share else margins
 
 
 def _stable_margins(plant: PlantBand, loop: Loop, share: float) -> PredictedMargins | None:
@@ -254,7 +255,7 @@ def _limits(best: SearchResult, lines: Lines) -> tuple[str, ...]:
     value = problem.clearances(x)
     behind = problem.structure.response(x)[0]
     loop = problem.plant.value * behind
-    found: dict[str, tuple[float, str]] = {}
+    nearest: dict[str, tuple[float, str]] = {}
     for place, column in zip(*np.nonzero(value < _ACTIVE)):
         f, distance = problem.plant.frequency_hz[column], float(value[place, column])
         if problem.plant.above[column]:
@@ -265,20 +266,20 @@ def _limits(best: SearchResult, lines: Lines) -> tuple[str, ...]:
             name = problem.region.nearest(loop[place, column])
             share = problem.plant.radius[place, column] / np.abs(problem.plant.value[place, column])
             words = f"the {name} at {f:.4g} Hz (bound there ± {100 * share:.2g} %)"
-        if name not in found or distance < found[name][0]:
-            found[name] = distance, words
+        if name not in nearest or distance < nearest[name][0]:
+            nearest[name] = distance, words
     limit = problem.specification.noise_limit
     if limit is not None and problem.noise_gain(x)[0] > 0.99 * limit:
-        what = "noise gain" if problem.specification.encoder_step is None else "input noise"
-        found["noise"] = 0.0, f"the {what} of {limit:g}"
-    return tuple(words for _, words in sorted(found.values()))
+        name_of_limit = "noise gain" if problem.specification.encoder_step is None else "input noise"
+        nearest["noise"] = 0.0, f"the {name_of_limit} of {limit:g}"
+    return tuple(words for _, words in sorted(nearest.values()))
 
 
 def _unknown_above(plant: PlantBand) -> str:
     """What may be above the highest line, in words."""
     shown = plant.lowest_shown_hz
-    what = "the plant is unknown" if shown is None else f"the lines show a mode near {shown:.4g} Hz"
-    return f"the highest line, {plant.lines_hz[-1]:g} Hz: above it {what}"
+    reason = "the plant is unknown" if shown is None else f"the lines show a mode near {shown:.4g} Hz"
+    return f"the highest line, {plant.lines_hz[-1]:g} Hz: above it {reason}"
 
 
 def _no_start(controller: Model | None, plant: PlantBand, asked: LoopSpecification, lines: Lines) -> TuneError:
@@ -287,25 +288,25 @@ def _no_start(controller: Model | None, plant: PlantBand, asked: LoopSpecificati
     if free is not None:
         loop = plant.value * free.problem.structure.response(free.x)[0]
         if above := lines_above(plant, loop, lines):
-            what = "no controller keeps the limits for all that the lines permit above them"
-            return _lines_missing(f"{what}: {_unknown_above(plant)}", above)
+            reason = "no controller keeps the limits for all that the lines permit above them"
+            return _lines_missing(f"{reason}: {_unknown_above(plant)}", above)
     if missing := missing_resonances(plant, lines):
-        what = "the lines do not resolve the response, and no controller is safe for all that it may be between them"
-        return _lines_missing(what, missing)
+        reason = "the lines do not resolve the response, and no controller is safe for all that it may be between them"
+        return _lines_missing(reason, missing)
     share = plant.radius / np.abs(plant.value)
-    at = np.unravel_index(int(np.argmax(np.where(plant.above, 0, share))), share.shape)
+    index = np.unravel_index(int(np.argmax(np.where(plant.above, 0, share))), share.shape)
     return TuneError(
         "no-stable-start",
         "no controller of the described structure keeps the limits for every plant within the bounds, which are up to "
-        f"± {100 * share[at]:.2g} % (at {plant.frequency_hz[at[1]]:.4g} Hz)",
+        f"± {100 * share[index]:.2g} % (at {plant.frequency_hz[index[1]]:.4g} Hz)",
         "measure longer or with more amplitude, or ask for smaller margins",
-        bound=float(share[at]),
-        frequency_hz=float(plant.frequency_hz[at[1]]),
+        bound=float(share[index]),
+        frequency_hz=float(plant.frequency_hz[index[1]]),
     )
 
 
-def _lines_missing(what: str, missing: MissingLines) -> TuneError:
-    return TuneError("lines-missing", what, missing.remedy, lines=missing.lines, window=missing.window)
+def _lines_missing(reason: str, missing: MissingLines) -> TuneError:
+    return TuneError("lines-missing", reason, missing.remedy, lines=missing.lines, window=missing.window)
 
 
 def _margins(of: PredictedMargins | None) -> dict[str, float | None] | None:

@@ -43,8 +43,12 @@ class PromiseReach:
         fall = np.abs(loop).max(axis=0)
         db = np.minimum(20 * np.log10(np.maximum(largest, 1e-300) / np.maximum(fall, 1e-300)), _LARGEST_DB)
         above = np.flatnonzero(plant.above)
-        at = [int(above[np.argmin(np.abs(f[above] - top * one))]) for one in _MULTIPLES if top * one <= f[-1]]
-        rows = tuple((float(f[i]), float(db[i:].min())) for i in dict.fromkeys(at))
+        indices = [
+            int(above[np.argmin(np.abs(f[above] - top * multiple))])
+            for multiple in _MULTIPLES
+            if top * multiple <= f[-1]
+        ]
+        rows = tuple((float(f[i]), float(db[i:].min())) for i in dict.fromkeys(indices))
         return cls(top, rows, plant.lowest_shown_hz)
 
     @property

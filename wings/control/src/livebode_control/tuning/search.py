@@ -51,9 +51,9 @@ def search(
     for notches, low_pass in _filters(plant, specification):
         structure = FeedbackStructure(controller, plant.frequency_hz, notches, low_pass=low_pass, fixed=fixed)
         problem = TuningProblem(structure, plant, specification)
-        found = _optimised(problem, best)
-        if found is not None and (best is None or found.merit > best.merit + _SIMPLER):
-            best = found
+        result = _optimised(problem, best)
+        if result is not None and (best is None or result.merit > best.merit + _SIMPLER):
+            best = result
     return best
 
 
@@ -61,15 +61,15 @@ def resonances(plant: PlantBand, count: int) -> list[float]:
     """Frequencies of the highest resonances over all places, the highest first; Hz."""
     from scipy.signal import find_peaks
 
-    found: list[tuple[float, float]] = []
-    at = ~plant.above & (plant.frequency_hz >= plant.lines_hz[0])
-    f = plant.frequency_hz[at]
-    for row in plant.value[:, at]:
+    peaks_of_rows: list[tuple[float, float]] = []
+    shown = ~plant.above & (plant.frequency_hz >= plant.lines_hz[0])
+    f = plant.frequency_hz[shown]
+    for row in plant.value[:, shown]:
         level = 20 * np.log10(np.abs(row) * f)
         peaks, facts = find_peaks(level, prominence=_PROMINENCE_DB)
-        found += zip(facts["prominences"].tolist(), f[peaks].tolist())
+        peaks_of_rows += zip(facts["prominences"].tolist(), f[peaks].tolist())
     chosen: list[float] = []
-    for _, frequency in sorted(found, reverse=True):
+    for _, frequency in sorted(peaks_of_rows, reverse=True):
         if all(abs(np.log(frequency / other)) > np.log(1.3) for other in chosen):
             chosen.append(frequency)
     return chosen[:count]
@@ -91,8 +91,8 @@ def _optimised(problem: TuningProblem, simpler: SearchResult | None) -> SearchRe
     starts = [_start(problem, corner_hz) for corner_hz in corners_hz]
     if starts[0] is None and simpler is not None:
         starts.append(_extended(problem, simpler))
-    found = [improved(problem, start) for start in starts if start is not None]
-    return max(found, key=lambda one: one.merit, default=None)
+    results = [improved(problem, start) for start in starts if start is not None]
+    return max(results, key=lambda result: result.merit, default=None)
 
 
 def improved(problem: TuningProblem, x: Floats) -> SearchResult:
@@ -171,7 +171,7 @@ def _moved(problem: TuningProblem, x: Floats, required: bool) -> Floats:
     structure = problem.structure
     nearest = _nearest(problem, x)
     columns = np.any(nearest, axis=0)
-    near, at = problem.only(columns), nearest[:, columns]
+    near, selected = problem.only(columns), nearest[:, columns]
     direction = _direction(structure)
     size = len(x)
     low, high = np.maximum(structure.low, x - _MOVE), np.minimum(structure.high, x + _MOVE)
@@ -181,7 +181,7 @@ def _moved(problem: TuningProblem, x: Floats, required: bool) -> Floats:
     @lru_cache(maxsize=1)  # SLSQP asks for values and slopes at the same point, one after the other
     def clearances(x: bytes) -> tuple[Floats, Floats]:
         value, slope = near.sloped_clearances(np.frombuffer(x))
-        return value[at], slope[at]
+        return value[selected], slope[selected]
 
     def limits(z: Floats) -> Floats:
         parts = [clearances(z[:size].tobytes())[0] - (z[-1] if required else 1e-4)]
@@ -192,23 +192,23 @@ def _moved(problem: TuningProblem, x: Floats, required: bool) -> Floats:
         return np.concatenate(parts)
 
     def slopes(z: Floats) -> Floats:
-        found = clearances(z[:size].tobytes())[1]
-        rows = [np.column_stack([found, np.full(len(found), -1.0)]) if required else found]
+        gradients = clearances(z[:size].tobytes())[1]
+        rows = [np.column_stack([gradients, np.full(len(gradients), -1.0)]) if required else gradients]
         if required:
             part = problem.tracking(z[:size])[1]
             rows.append(np.column_stack([part, np.zeros(len(part))]))
         if problem.specification.noise_limit is not None:
-            one = -problem.noise_gain(z[:size])[1]
-            rows.append(np.append(one, np.zeros(len(z) - size))[np.newaxis])
+            gradient = -problem.noise_gain(z[:size])[1]
+            rows.append(np.append(gradient, np.zeros(len(z) - size))[np.newaxis])
         return np.concatenate(rows)
 
     begin = np.append(x, float(np.min(problem.clearances(x)))) if required else x
     bounds = list(zip(np.append(low, [-2.0] * required), np.append(high, [2.0] * required)))
-    found = minimize(  # type: ignore[call-overload]
+    solution = minimize(  # type: ignore[call-overload]
         lambda z: float(goal @ z), begin, jac=lambda _: goal, bounds=bounds, method="SLSQP",
         constraints={"type": "ineq", "fun": limits, "jac": slopes}, options={"maxiter": _STEPS, "ftol": 1e-5},
     )  # fmt: skip
-    z = np.asarray(found.x[:size], dtype=np.float64)
+    z = np.asarray(solution.x[:size], dtype=np.float64)
     return np.clip(np.where(np.isfinite(z), z, x), low, high)
 
 

@@ -7,7 +7,7 @@ from livebode_control.tuning.input_shaper import InputShaper
 KLIPPER_KINDS = ("zv", "zvd", "ei")
 
 
-def klipper_text(one: InputShaper, axis: str = "x") -> str:
+def klipper_text(shaper: InputShaper, axis: str = "x") -> str:
     """The section `[input_shaper]` of Klipper's configuration, for one of the kinds that it has.
 
     Its keys are those of Klipper's configuration reference (2024); it computes the impulses itself.
@@ -21,19 +21,19 @@ def klipper_text(one: InputShaper, axis: str = "x") -> str:
     <BLANKLINE>
     """
     return (
-        f"[input_shaper]\nshaper_type_{axis}: {one.kind}\nshaper_freq_{axis}: {one.frequency_hz:.2f}\n"
-        f"damping_ratio_{axis}: {one.damping:.4f}\n"
+        f"[input_shaper]\nshaper_type_{axis}: {shaper.kind}\nshaper_freq_{axis}: {shaper.frequency_hz:.2f}\n"
+        f"damping_ratio_{axis}: {shaper.damping:.4f}\n"
     )
 
 
-def c_header(one: InputShaper, rate_hz: float) -> str:
+def c_header(shaper: InputShaper, rate_hz: float) -> str:
     """A C99 header: the impulses as weights of past samples of the reference, and a function for one sample."""
-    taps = [(n, float(a)) for n, a in enumerate(one.taps(rate_hz)) if a]
+    taps = [(n, float(a)) for n, a in enumerate(shaper.taps(rate_hz)) if a]
     samples = taps[-1][0] + 1
     rows = ",\n".join(f"    {{{n}, {a!r}}}" for n, a in taps)
     return (
-        f"/* Input shaper {one.kind} at {rate_hz:g} Hz for a mode at {one.frequency_hz:.6g} Hz, damping "
-        f"{one.damping:.4g}. */\n"
+        f"/* Input shaper {shaper.kind} at {rate_hz:g} Hz for a mode at {shaper.frequency_hz:.6g} Hz, damping "
+        f"{shaper.damping:.4g}. */\n"
         "#ifndef LIVEBODE_SHAPER_H\n#define LIVEBODE_SHAPER_H\n\n"
         f"#define LIVEBODE_SHAPER_SAMPLES {samples}\n"
         "typedef struct { int delay; double weight; } livebode_tap;\n"
@@ -51,7 +51,7 @@ def c_header(one: InputShaper, rate_hz: float) -> str:
     )
 
 
-def structured_text(one: InputShaper, rate_hz: float) -> str:
+def structured_text(shaper: InputShaper, rate_hz: float) -> str:
     """A function block in Structured Text (IEC 61131-3), called once in each cycle with the reference.
 
     >>> from livebode_control.tuning.input_shaper import zv
@@ -60,7 +60,7 @@ def structured_text(one: InputShaper, rate_hz: float) -> str:
     """
     from livebode.structured_text import real
 
-    taps = [(n, float(a)) for n, a in enumerate(one.taps(rate_hz)) if a]
+    taps = [(n, float(a)) for n, a in enumerate(shaper.taps(rate_hz)) if a]
     samples = taps[-1][0] + 1
     sums = [f"fOut := fOut + {real(a)} * fMemory[(nNext + {samples - n}) MOD {samples}];" for n, a in taps]
     return "\n".join(

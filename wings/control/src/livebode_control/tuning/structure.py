@@ -102,7 +102,7 @@ class FeedbackStructure:
         self._inner = inner
         self.sign = -1.0 if (inner.gain if isinstance(inner, PID) else inner.velocity_gain) < 0 else 1.0
         filters = fixed.biquads if fixed is not None else ()
-        untuned = [one.response(frequency_hz) for one in (_timing(inner), *filters)]
+        untuned = [part.response(frequency_hz) for part in (_timing(inner), *filters)]
         self._untuned = self.sign * np.prod(untuned, axis=0)
         self.names, self.start, self.low, self.high = self._variables()
         if isinstance(inner, PID):
@@ -110,8 +110,8 @@ class FeedbackStructure:
             slope = 1 / integral(frequency_hz, inner.rate_hz, "backward")
             self._slope = slope / (1 + inner.derivative_filter_s * slope)
         else:
-            one = replace(inner, position_gain=0.0, velocity_gain=1.0)
-            self._slope = one.law(frequency_hz)
+            shape = replace(inner, position_gain=0.0, velocity_gain=1.0)
+            self._slope = shape.law(frequency_hz)
         if isinstance(controller, Cascade):
             self._position = controller.outer(frequency_hz)
 
@@ -133,10 +133,10 @@ class FeedbackStructure:
         if isinstance(self.controller, Cascade):
             position = getattr(self.controller.position, "gain", 1.0)
             rows.append(("position_gain", position, 1e-3 * position, inner.rate_hz))
-        for i, at in enumerate(self.notches_hz):
+        for i, notch_hz in enumerate(self.notches_hz):
             turn = np.exp(_NOTCH_MOVES)
             rows += [
-                (f"notch{i}_frequency", at, at / turn, min(at * turn, 0.48 * inner.rate_hz)),
+                (f"notch{i}_frequency", notch_hz, notch_hz / turn, min(notch_hz * turn, 0.48 * inner.rate_hz)),
                 (f"notch{i}_depth", 0.3, *_DEPTH),
                 (f"notch{i}_damping", 0.5, *_DAMPING),
             ]
@@ -156,7 +156,7 @@ class FeedbackStructure:
         return self.names.index(name) if name in self.names else None
 
     def only(self, columns: NDArray[np.bool_]) -> FeedbackStructure:
-        """The same at some of the frequencies."""
+        """This structure at some of its frequencies."""
         return FeedbackStructure(
             self.controller, self.frequency_hz[columns], self.notches_hz, low_pass=self.low_pass, fixed=self.fixed
         )
@@ -199,8 +199,8 @@ class FeedbackStructure:
 
     def _notch(self, value: dict[str, float], number: int, slopes: Complex) -> Complex:
         """That of `livebode_control.tuning.filters.notch`, as a function of tan(πf/rate)."""
-        at, depth, damping = (value[f"notch{number}_{name}"] for name in ("frequency", "depth", "damping"))
-        v, dv = self._warped(at)
+        notch_hz, depth, damping = (value[f"notch{number}_{name}"] for name in ("frequency", "depth", "damping"))
+        v, dv = self._warped(notch_hz)
         above, below = 1 - v**2 + 2j * depth * damping * v, 1 - v**2 + 2j * damping * v
         first = self.names.index(f"notch{number}_frequency")
         up, down = 2j * depth * damping * v / above, 2j * damping * v / below

@@ -106,19 +106,19 @@ def correlation(
     """
     count = len(residual)
     scale = np.sqrt(np.dot(residual, residual) * np.dot(x, x))
-    at = np.arange(-lags, lags + 1)
+    lag = np.arange(-lags, lags + 1)
     value = _across(residual, x, lags) / scale
     moved = np.stack([_across(slope, x, lags) for slope in slopes.T], axis=1) / scale
     of_chance = _chance(residual, x, lags) / count
     spread = of_chance + moved @ covariance @ moved.T
-    judged = at >= first_judged
+    judged = lag >= first_judged
     own = linalg.toeplitz(_across(x, x, 2 * lags)[2 * lags :])[np.ix_(judged, judged)]
     among = spread[np.ix_(judged, judged)]
     missed, by_chance = _following(own, value[judged] * scale, among * scale**2)
     follows, _ = _following(own, _across(output, x, lags)[judged], among)
     return Correlation(
         name=name,
-        lags=at,
+        lags=lag,
         value=value,
         limit=LIMIT * np.sqrt(np.diag(spread)),
         white_limit=LIMIT / np.sqrt(count),

@@ -76,26 +76,26 @@ class LineValidation:
 
     @property
     def verdict(self) -> LineVerdict:
-        """As that of a `Validation`: an error counts as small below a tenth."""
-        found = self.p < _ALPHA
-        if found and self.missed >= SMALL and self.missed >= self.resolution:
+        """The verdict as that of a `Validation`: an error counts as small below a tenth."""
+        significant = self.p < _ALPHA
+        if significant and self.missed >= SMALL and self.missed >= self.resolution:
             return "fails"
-        if self.resolution >= 1 or (found and self.missed >= SMALL):
+        if self.resolution >= 1 or (significant and self.missed >= SMALL):
             return "cannot be judged"
-        return "small error" if found else "passes"
+        return "small error" if significant else "passes"
 
     @property
     def worst(self) -> tuple[float, float]:
         """Frequency of the line with the largest residual over its standard deviation, and that ratio."""
         ratio = self.residual / self.sigma
-        at = int(np.argmax(ratio))
-        return float(self.frequency_hz[at]), float(ratio[at])
+        index = int(np.argmax(ratio))
+        return float(self.frequency_hz[index]), float(ratio[index])
 
     @property
     def sentence(self) -> str:
         """The verdict as text, with what was used and why."""
         shows = f"{100 * self.resolution:.2g} %"
-        rest = {
+        text = {
             "passes": f"the response is that of the model, and an error of {shows} would have been detected",
             "small error": f"the model misses {100 * self.missed:.2g} % of the response, less than a tenth",
             "fails": f"the model misses {100 * self.missed:.2g} % of the response: it is incomplete or belongs to "
@@ -103,7 +103,7 @@ class LineValidation:
             "cannot be judged": f"only an error of {shows} would show; average longer or increase the excitation",
         }[self.verdict]
         return (
-            f"{self.model} {self.verdict}: {rest} (fit {self.fit_percent:.1f} % at {len(self.frequency_hz)} lines); "
+            f"{self.model} {self.verdict}: {text} (fit {self.fit_percent:.1f} % at {len(self.frequency_hz)} lines); "
             f"judged at the lines, because {self.reason}"
         )
 
@@ -166,21 +166,21 @@ def validate_at_lines(model: FittedModel, response: Response, *, reason: str) ->
             lines=int(np.count_nonzero(use)),
         )
     f, value, sigma = f[use], response.value[use], response.sigma[use]
-    rest = value - model.at(model.values, f)
+    residual = value - model.at(model.values, f)
     slope = _slopes(model, f)
     of_fit = slope @ model.covariance @ slope.T
     whole = np.diag(np.tile(sigma**2 / 2, 2)) + of_fit
-    stacked = np.concatenate([rest.real, rest.imag])
+    stacked = np.concatenate([residual.real, residual.imag])
     half = float(stacked @ np.linalg.solve(whole, stacked)) / 2
     total = np.sqrt(np.diag(whole)[: f.size] + np.diag(whole)[f.size :])
-    larger = np.maximum(np.abs(value) - 2 * sigma, np.abs(value - rest))
-    relative, size = (total / larger) ** 2, np.abs(rest / larger) ** 2
+    larger = np.maximum(np.abs(value) - 2 * sigma, np.abs(value - residual))
+    relative, size = (total / larger) ** 2, np.abs(residual / larger) ** 2
     share = 1 / (relative + SMALL**2)
     share /= np.sum(share)
     return LineValidation(
         model=model.name,
         frequency_hz=f,
-        residual=np.abs(rest),
+        residual=np.abs(residual),
         sigma=total,
         missed=float(np.sqrt(max(float(share @ (size - relative)), 0.0))),
         resolution=float(np.sqrt(_SHOWS * float(np.linalg.norm(share * relative)))),
@@ -194,12 +194,12 @@ def validate_at_lines(model: FittedModel, response: Response, *, reason: str) ->
 def _slopes(model: FittedModel, f: Floats) -> Floats:
     """Real above imaginary parts of the derivatives by the parameters, (2·lines, parameters)."""
     sigma = np.sqrt(np.maximum(np.diag(model.covariance), 0.0))
-    found = np.zeros((2 * f.size, sigma.size))
+    slopes = np.zeros((2 * f.size, sigma.size))
     for i in np.flatnonzero(sigma > 0):
         step = _STEP * sigma[i] * np.eye(sigma.size)[i]
         change = (model.at(model.values + step, f) - model.at(model.values - step, f)) / (2 * _STEP * sigma[i])
-        found[:, i] = np.concatenate([change.real, change.imag])
-    return found
+        slopes[:, i] = np.concatenate([change.real, change.imag])
+    return slopes
 
 
 def _probability(half: float, lines: int, dof: float) -> float:
@@ -234,15 +234,15 @@ def validate_run_at_lines(
         If the other run has no usable lines.
     """
     runs = [RunRecord.open(path, entry=entry) for path in (directory, other)]
-    for what in ("quantity", "unit"):
-        one, two = (run.found.get(what, "") for run in runs)
-        if one != two:
+    for attribute in ("quantity", "unit"):
+        first, second = (run.found.get(attribute, "") for run in runs)
+        if first != second:
             raise GridError(
                 "not-alike",
-                f"{directory.name!r} has the {what} {one!r} and {other.name!r} {two!r}",
+                f"{directory.name!r} has the {attribute} {first!r} and {other.name!r} {second!r}",
                 "validate on a run of the same input and output",
-                what=what,
-                values=[one, two],
+                what=attribute,
+                values=[first, second],
             )
     average, response = averaged(runs[0]), averaged(runs[1]).response
     fits: list[tuple[Fit | CommonPoles, str]] = []

@@ -21,7 +21,6 @@ def validate_run(
     log: Path,
     sections: list[FitSection],
     *,
-    lags: int = 40,
     samples: int | None = None,
     channels: dict[str, str | None] | None = None,
 ) -> tuple[list[Validation], list[str]]:
@@ -99,7 +98,7 @@ def validate_run(
     loop = axis.loop.build(block.rate_hz)
     roles = {"input": signals.input, "output": signals.output, "excitation": signals.excitation}
     fits = [fit_run(directory, section)[0] for section in sections]
-    judged = [validate(fit, block, loop=loop, lags=lags, **roles) for fit in fits if fit.status == "ok"]  # type: ignore[arg-type]
+    judged = [validate(fit, block, loop=loop, **roles) for fit in fits if fit.status == "ok"]  # type: ignore[arg-type]
     refused = [
         Message("{model} was not fitted: {why}", model=fit.model.name, why=fit.sentence)
         for fit in fits

@@ -50,12 +50,12 @@ class ValidationReport:
             "On {recording}: measured and simulated output, and the residual's correlations with their limits.",
             recording=self.on,
         )
-        parts.append(Picture(_FIGURE, {"found": self.found, "title": tr("Measured and simulated")}, caption))
+        parts.append(Picture(_FIGURE, {"validations": self.found, "title": tr("Measured and simulated")}, caption))
         return Section(tr("Validation"), tuple(parts))
 
 
 def validation_report(directory: Path, on: Path) -> ValidationReport:
     """The model of a run's [fit], simulated with another recording; see `validate_run`."""
     section = FitSection.model_validate(recorded_configuration(RunRecord.open(directory).summary).get("fit", {}))
-    found, notes = validate_run(directory, on, [section])
-    return ValidationReport(on.name, tuple(found), tuple(notes))
+    results, notes = validate_run(directory, on, [section])
+    return ValidationReport(on.name, tuple(results), tuple(notes))

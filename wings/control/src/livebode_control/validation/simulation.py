@@ -18,7 +18,7 @@ _RINGS_OUT = 1e-12
 _AT_REST = 1e-5  # of a pole times the recording's length: slower ones act as integrators
 
 
-class Simulated(NamedTuple):
+class SimulatedOutput(NamedTuple):
     """Result of the simulation of a recording.
 
     Attributes
@@ -44,7 +44,7 @@ class Simulated(NamedTuple):
         return np.asarray(x - self.basis @ (self.basis.T @ x))
 
 
-def simulate(fit: Fit, u: Floats, y: Floats) -> Simulated:
+def simulate(fit: Fit, u: Floats, y: Floats) -> SimulatedOutput:
     """The model driven by u, against y.
 
     The unknown state of the model is fitted by least squares: the free motion of each pole, and a polynomial whose
@@ -83,17 +83,17 @@ def simulate(fit: Fit, u: Floats, y: Floats) -> Simulated:
         step = _STEP * sigma * np.eye(len(values))[i]
         change = _forced(fit, values + step, u) - _forced(fit, values - step, u)
         slopes[:, i] = change[known] / (2 * _STEP)
-    found = Simulated(known, forced, y[known] - forced, slopes, np.linalg.qr(own)[0])
-    residual = found.without(found.residual)
-    return found._replace(output=y[known] - residual, residual=residual, slopes=found.without(slopes))
+    simulated = SimulatedOutput(known, forced, y[known] - forced, slopes, np.linalg.qr(own)[0])
+    residual = simulated.without(simulated.residual)
+    return simulated._replace(output=y[known] - residual, residual=residual, slopes=simulated.without(slopes))
 
 
 def _forced(fit: Fit, values: Floats, u: Floats) -> Floats:
     """Response to u from rest."""
     transfer, delay_s = _parts(fit, values)
     early = max(0, _whole(-delay_s * fit.rate_hz))  # an input that was logged later than it acted
-    found = respond(transfer, u, fit.rate_hz, delay_s * fit.rate_hz + early, fit.hold)
-    return np.append(found[early:], np.full(early, found[-1]))
+    response = respond(transfer, u, fit.rate_hz, delay_s * fit.rate_hz + early, fit.hold)
+    return np.append(response[early:], np.full(early, response[-1]))
 
 
 def _unforced(fit: Fit, values: Floats, samples: int) -> Floats:
@@ -165,8 +165,8 @@ def respond(
         for weight, state in zip(step[k], states):
             push = push + weight * state
         states.append(signal.lfilter([0.0, 1.0], [1.0, -pole], push))
-    found = sum(weight * state for weight, state in zip(_weights(transfer, poles * rate_hz, rate_hz), states))
-    return np.asarray(np.append(np.zeros(whole), np.real(found)))[: len(u)]
+    total = sum(weight * state for weight, state in zip(_weights(transfer, poles * rate_hz, rate_hz), states))
+    return np.asarray(np.append(np.zeros(whole), np.real(total)))[: len(u)]
 
 
 def _held(poles: Complex, late: float) -> list[Complex]:
@@ -201,9 +201,9 @@ def _step(poles: Complex, ticks: float, powers: int) -> Complex:
 
 def _weights(transfer: Transfer, poles: Complex, rate_hz: float) -> Complex:
     """Weights of the chain's states in the output: N(s) in Newton's form, by successive division by each factor."""
-    rest = (transfer.numerator / transfer.denominator[0]).astype(np.complex128)
-    found = np.zeros(len(poles), dtype=np.complex128)
+    remaining = (transfer.numerator / transfer.denominator[0]).astype(np.complex128)
+    weights = np.zeros(len(poles), dtype=np.complex128)
     for k in range(len(poles) - 1, -1, -1):
-        rest, remainder = np.polydiv(rest, np.array([1.0, -poles[k]]))
-        found[k] = remainder[-1] / rate_hz ** (k + 1)
-    return found
+        remaining, remainder = np.polydiv(remaining, np.array([1.0, -poles[k]]))
+        weights[k] = remainder[-1] / rate_hz ** (k + 1)
+    return weights

@@ -1,4 +1,4 @@
-"""`livebode validate`: test the fitted model of a run on independent data."""
+"""`livebode validate`: test the fitted model of a run on independent data, or the description of its loop."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from livebode.cli import Entry, Excitation, Json, Output, results_directory
-from livebode.core import LivebodeError, RecordError, writing
+from livebode.cli import Entry, Excitation, Json, Output, check_use, results_directory
+from livebode.core import LivebodeError, RecordError, UsageError, writing
 from livebode.locations import location
 
 if TYPE_CHECKING:
@@ -20,24 +20,28 @@ Channels = dict[str, str | None]
 
 
 def validate_command(
+    context: typer.Context,
     directory: Annotated[Path, typer.Argument(metavar="RUN", help="Run directory.", parser=location)],
     on: Annotated[
-        Path,
+        Path | None,
         typer.Option(
             "--on",
             metavar="LOG|RUN",
             help="A recording that the run does not contain, or another run.",
             parser=location,
         ),
-    ],
+    ] = None,
+    loop: Annotated[
+        bool, typer.Option("--loop", help="Compare the described controllers with the signals of the run instead.")
+    ] = False,
+    axis: Annotated[
+        Path | None,
+        typer.Option(metavar="AXIS.toml", help="For --loop: read \\[loop] from this file instead of the run."),
+    ] = None,
     model: Annotated[
         list[str] | None,
         typer.Option(help="rigid, two-mass, … modal; repeat to compare. \\[default: the run's \\[fit]]"),
     ] = None,
-    radius: Annotated[
-        float | None, typer.Option(metavar="M", help="Radius of the pulley, for a load in linear motion.")
-    ] = None,
-    lags: Annotated[int, typer.Option(min=1, help="Largest lag of the correlations, in samples.")] = 40,
     samples: Annotated[int | None, typer.Option(min=1, help="Use only the last ones. \\[default: all]")] = None,
     output: Output = None,
     input: Annotated[str | None, typer.Option(metavar="CHANNEL", help="Channel of the plant input u.")] = None,
@@ -49,45 +53,83 @@ def validate_command(
     entry: Entry = None,
     as_json: Json = False,
 ) -> None:
-    """Simulate the fitted model with another recording and test whether the residual correlates with the signals.
+    """Test the fitted model on another recording, or with --loop the described controllers on the recorded signals.
 
-    Writes validation.png to the run directory. The parameters are constant: the mean over the run, also for a
+    With --on, the model is simulated with the other recording, and the residual is tested for correlation with the
+    signals; writes validation.png to the run directory. The parameters are constant: the mean over the run, also for a
     machine whose plant changes with position. The channels default to those of the run. A model whose simulation is
     not valid, such as of a double integrator that drifts, is judged at the lines: LOG is tracked as the run was. So is
     an entry of a matrix run.
+
+    With --loop, the result is as described, or the change of the description that explains the signals. It needs
+    excitation, input and output in the samples of the run, and writes loop-check.json to the run directory: `livebode
+    margins` and `livebode report` show it. Of a matrix run each of [[loop.controllers]] is compared with its own
+    signals.
     """
+    check_use(context, "--loop", ("--axis",), ("--output", "--input", "--excitation"))
+    channels = {"output": output, "input": input, "excitation": excitation}
+    if loop:
+        from livebode_control.loop_check.loop_check_command import validate_loop
+
+        validate_loop(directory, axis, channels, as_json=as_json)
+    elif on is None:
+        raise _nothing_to_validate()
+    else:
+        _validate_model(directory, on, model or [], samples, channels, at_lines, entry, as_json=as_json)
+
+
+def _nothing_to_validate() -> UsageError:
+    return UsageError(
+        "missing",
+        "there is nothing to validate",
+        "give --on LOG to test the fitted model, or --loop to compare the described controllers with the signals",
+        options=["--on", "--loop"],
+    )
+
+
+def _validate_model(
+    directory: Path, on: Path, models: list[str], samples: int | None,
+    channels: Channels, at_lines: bool, entry: str | None, *, as_json: bool,
+) -> None:  # fmt: skip
+    """Test the models on a recording or another run, write their picture, and print the verdicts."""
     from livebode.cli import tell_how_to_draw
     from livebode.configuration import FitSection, recorded_configuration
     from livebode.records import RunRecord, to_json
     from livebode_control.validation.run_validation import validate_run
 
-    base = recorded_configuration(RunRecord.open(directory, entry=entry).summary).get("fit", {}) | (
-        {} if radius is None else {"radius_m": radius}
-    )
-    named = [{"model": name} for name in model or []] or [{}]
-    sections = [FitSection.model_validate(base | one) for one in named]
-    channels = {"output": output, "input": input, "excitation": excitation}
+    base = recorded_configuration(RunRecord.open(directory, entry=entry).summary).get("fit", {})
+    named = [{"model": name} for name in models] or [{}]
+    sections = [FitSection.model_validate(base | section) for section in named]
     reasons = [_reason(section, on, at_lines, entry) for section in sections]
     simulated = [section for section, reason in zip(sections, reasons) if not reason]
-    found: list[Validation] = []
+    simulated_results: list[Validation] = []
     notes: list[str] = []
     if simulated:
-        found, notes = validate_run(directory, on, simulated, lags=lags, samples=samples, channels=channels)
-    drifting = {v.model: v.why_lines for v in found if v.drifts}
+        simulated_results, notes = validate_run(directory, on, simulated, samples=samples, channels=channels)
+    drifting = {v.model: v.why_lines for v in simulated_results if v.drifts}
     wanted = [(section, reason) for section, reason in zip(sections, reasons) if reason or drifting]
-    at: list[LineValidation] = []
+    line_results: list[LineValidation] = []
     if wanted:
-        at, more = _at_lines(directory, on, wanted, drifting, channels, entry)
+        line_results, more = _at_lines(directory, on, wanted, drifting, channels, entry)
         notes = list(dict.fromkeys([*notes, *more]))
-    found = [v for v in found if v.model not in {one.model for one in at}]  # one verdict for each model
-    picture = _picture(found, directory, on) if found else None
+    simulated_results = [
+        v for v in simulated_results if v.model not in {result.model for result in line_results}
+    ]  # one verdict for each model
+    picture = _picture(simulated_results, directory, on) if simulated_results else None
     if as_json:
-        print(to_json({"models": [v.plain() for v in found] + [one.plain() for one in at], "notes": notes}))
+        print(
+            to_json(
+                {
+                    "models": [v.plain() for v in simulated_results] + [result.plain() for result in line_results],
+                    "notes": notes,
+                }
+            )
+        )
         return
-    for validation in found:
+    for validation in simulated_results:
         show_validation(validation)
-    for one in at:
-        show_line_validation(one)
+    for result in line_results:
+        show_line_validation(result)
     for sentence in notes:
         print(sentence)
     if picture is not None:
@@ -108,7 +150,7 @@ def _reason(section: FitSection, on: Path, at_lines: bool, entry: str | None) ->
     return f"a {section.model} model is not simulated" if section.model in POLE_MODELS else ""
 
 
-def _picture(found: list[Validation], directory: Path, on: Path) -> Path | None:
+def _picture(results: list[Validation], directory: Path, on: Path) -> Path | None:
     from livebode.cli import can_draw
 
     if not can_draw():
@@ -117,7 +159,7 @@ def _picture(found: list[Validation], directory: Path, on: Path) -> Path | None:
 
     into = results_directory(directory)
     with writing(into, RecordError):
-        return save_validation_picture(found, into, title=f"{directory.name} on {on.name}")
+        return save_validation_picture(results, into, title=f"{directory.name} on {on.name}")
 
 
 def _at_lines(
@@ -160,14 +202,14 @@ def _tracked_alike(directory: Path, on: Path, channels: Channels) -> Axis:
     return Axis.of(data | {"source": source | {"log": on}, "signals": signals}, str(directory))
 
 
-def show_validation(found: Validation) -> None:
+def show_validation(validation: Validation) -> None:
     """Print the verdict and the tests behind it."""
-    print(found.sentence)
-    white = "white" if found.whiteness >= 0.03 else "not white"
-    of_it = f"rms {found.residual_sigma:.3g}"
-    print(f"  {found.samples} samples; the residual is {white} (p = {found.whiteness:.2g}), {of_it}")
-    for c in found.correlations:
-        counts = "counts" if c.name in found.judged_by else "does not count"
+    print(validation.sentence)
+    white = "white" if validation.whiteness >= 0.03 else "not white"
+    of_it = f"rms {validation.residual_sigma:.3g}"
+    print(f"  {validation.samples} samples; the residual is {white} (p = {validation.whiteness:.2g}), {of_it}")
+    for c in validation.correlations:
+        counts = "counts" if c.name in validation.judged_by else "does not count"
         lags = "all lags" if c.judged.all() else f"lags {c.lags[c.judged][0]} … {c.lags[-1]}"
         print(
             f"  with {c.name}, {lags}: {100 * c.share:.0f} % inside the limit, {100 * c.white_share:.0f} % inside "
@@ -175,11 +217,11 @@ def show_validation(found: Validation) -> None:
         )
 
 
-def show_line_validation(found: LineValidation) -> None:
+def show_line_validation(validation: LineValidation) -> None:
     """Print the verdict and the numbers behind it."""
-    print(found.sentence)
-    at_hz, sigmas = found.worst
+    print(validation.sentence)
+    at_hz, sigmas = validation.worst
     print(
-        f"  chi² {found.chi2:.3g} per degree of freedom by both uncertainties (p = {found.p:.2g}); worst line "
-        f"{at_hz:g} Hz, {sigmas:.2g} sigma"
+        f"  chi² {validation.chi2:.3g} per degree of freedom by both uncertainties (p = {validation.p:.2g}); "
+        f"worst line {at_hz:g} Hz, {sigmas:.2g} sigma"
     )

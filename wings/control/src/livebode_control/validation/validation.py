@@ -12,7 +12,7 @@ from livebode.core import Block, Loop, SignalError, same_rate
 from livebode.fitting import Fit
 from livebode.language import Message
 from livebode_control.validation.correlation import SMALL, Correlation, correlation, own_correlation
-from livebode_control.validation.simulation import Simulated, simulate
+from livebode_control.validation.simulation import SimulatedOutput, simulate
 
 Verdict = Literal["passes", "small error", "fails", "cannot be judged"]
 
@@ -52,7 +52,7 @@ class Validation:
     whiteness: float
     correlations: tuple[Correlation, ...]
     judged_by: tuple[str, ...]
-    simulated: Simulated
+    simulated: SimulatedOutput
     measured: Floats
     rate_hz: float
     output: str
@@ -79,15 +79,15 @@ class Validation:
         as the output due to the driving signal would not have been detected.
         """
         counted, by = self._counted, self.driven_by
-        found = any(c.p < _ALPHA / len(counted) for c in counted)
-        large = found and by.missed >= SMALL
+        significant = any(c.p < _ALPHA / len(counted) for c in counted)
+        large = significant and by.missed >= SMALL
         if self.drifts:
             return "cannot be judged"
         if large and by.missed >= by.resolution:
             return "fails"
         if large or by.resolution >= 1:
             return "cannot be judged"
-        return "small error" if found else "passes"
+        return "small error" if significant else "passes"
 
     @property
     def sentence(self) -> Message:
@@ -112,7 +112,7 @@ class Validation:
             ),
             Message("cannot be judged"): self._why_not,
         }
-        found = Message(
+        sentence = Message(
             "{model} {verdict}: {why} (fit {fit_percent:.1f} %)",
             model=self.model,
             verdict=Message(self.verdict),
@@ -122,9 +122,9 @@ class Validation:
         if self.doubtful and self.verdict in ("small error", "fails"):
             return Message(
                 "{result}; in a loop, coloured noise alone can cause this: specify the excitation to be sure",
-                result=found,
+                result=sentence,
             )
-        return found
+        return sentence
 
     @property
     def driven_by(self) -> Correlation:
@@ -245,27 +245,27 @@ def validate(
     signals = _aligned({role: block[name] for role, name in names.items()}, loop)
     count = len(signals["input"])
     _check(signals, names, count, lags)
-    found = simulate(fit, signals["input"], signals["output"])
-    signals = {role: x[found.known] for role, x in signals.items()}
-    matrix, measured = _correlated(fit), found.without(signals["output"])
-    given = [("u", signals["input"], 1), ("ŷ", found.output, 1)]
+    simulated = simulate(fit, signals["input"], signals["output"])
+    signals = {role: x[simulated.known] for role, x in signals.items()}
+    matrix, measured = _correlated(fit), simulated.without(signals["output"])
+    given = [("u", signals["input"], 1), ("ŷ", simulated.output, 1)]
     if excitation:
         given.append(("w", signals["excitation"], -lags))
     correlations = tuple(
-        correlation(name, found.residual, measured, found.without(x), lags, found.slopes, matrix, first)
+        correlation(name, simulated.residual, measured, simulated.without(x), lags, simulated.slopes, matrix, first)
         for name, x, first in given
     )
-    _, whiteness = own_correlation(found.residual, lags)
+    _, whiteness = own_correlation(simulated.residual, lags)
     by = ("w",) if excitation and whiteness < _ALPHA else tuple(c.name for c in correlations)
     return Validation(
         model=fit.model.name,
         samples=len(signals["output"]),
-        fit_percent=100 * (1 - float(np.linalg.norm(found.residual) / np.linalg.norm(measured))),
-        residual_sigma=float(np.sqrt(np.mean(found.residual**2))),
+        fit_percent=100 * (1 - float(np.linalg.norm(simulated.residual) / np.linalg.norm(measured))),
+        residual_sigma=float(np.sqrt(np.mean(simulated.residual**2))),
         whiteness=whiteness,
         correlations=correlations,
         judged_by=by,
-        simulated=found,
+        simulated=simulated,
         measured=signals["output"],
         rate_hz=block.rate_hz,
         integrators=fit.model.continuous(fit.parameters.value[0]).integrators,

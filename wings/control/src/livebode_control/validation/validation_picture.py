@@ -25,14 +25,14 @@ _CLIPPED = 4.0  # times the limit: larger correlations are clipped at the edge, 
 
 
 def save_validation_picture(
-    found: Sequence[Validation], directory: str | PathLike[str], *, title: str = "", dark: bool = False
+    validations: Sequence[Validation], directory: str | PathLike[str], *, title: str = "", dark: bool = False
 ) -> Path:
     """Write validation.png to an existing directory."""
-    return save(validation_figure(found, title=title, dark=dark), Path(directory) / "validation.png", style(dark))
+    return save(validation_figure(validations, title=title, dark=dark), Path(directory) / "validation.png", style(dark))
 
 
 def validation_figure(
-    found: Sequence[Validation], *, title: str = "", dark: bool = False, width_in: float | None = None
+    validations: Sequence[Validation], *, title: str = "", dark: bool = False, width_in: float | None = None
 ) -> Figure:
     """A row for each model: the last samples of the output, and the correlations over the lags.
 
@@ -42,23 +42,23 @@ def validation_figure(
     wrong model are thin; a triangle at the edge marks a correlation beyond it.
     """
     look = style(dark)
-    columns = max(len(v.correlations) for v in found)
+    columns = max(len(v.correlations) for v in validations)
     folded = width_in is not None
     with drawing(look):
         if width_in is not None:
-            figure, grid = _grid(width_in, 2 * len(found), columns, [1.0] * columns)
+            figure, grid = _grid(width_in, 2 * len(validations), columns, [1.0] * columns)
         else:
-            figure, grid = _grid(3.4 * (columns + 1) + 1.2, len(found), columns + 1, [1.5, *[1.0] * columns])
+            figure, grid = _grid(3.4 * (columns + 1) + 1.2, len(validations), columns + 1, [1.5, *[1.0] * columns])
         facts = tr(
             "{samples} samples · band: 97 % of random correlations at each lag · dashed: {limit:.2f}/√L",
-            samples=found[0].samples, limit=2.17,
+            samples=validations[0].samples, limit=2.17,
         )  # fmt: skip
         heading(figure, look, title or tr("Validation"), facts, 0.7 / figure.get_size_inches()[0])
-        for row, one in enumerate(found):
-            last, below = row == len(found) - 1, 2 * row + 1 if folded else row
-            _output(figure.add_subplot(grid[2 * row, :] if folded else grid[row, 0]), look, one, last or folded)
-            for column, c in enumerate(one.correlations, 0 if folded else 1):
-                _correlation(figure.add_subplot(grid[below, column]), look, c, c.name in one.judged_by, last)
+        for row, validation in enumerate(validations):
+            last, below = row == len(validations) - 1, 2 * row + 1 if folded else row
+            _output(figure.add_subplot(grid[2 * row, :] if folded else grid[row, 0]), look, validation, last or folded)
+            for column, c in enumerate(validation.correlations, 0 if folded else 1):
+                _correlation(figure.add_subplot(grid[below, column]), look, c, c.name in validation.judged_by, last)
     return figure
 
 
@@ -72,19 +72,19 @@ def _grid(width_in: float, rows: int, columns: int, ratios: list[float]) -> tupl
     return figure, grid
 
 
-def _output(axes: Axes, look: Style, found: Validation, last: bool) -> None:
-    shown = slice(max(0, found.samples - _SHOWN), found.samples)
-    at_s = np.arange(found.samples)[shown] / found.rate_hz
-    axes.plot(at_s, found.measured[shown], color=look.newest, linewidth=2.6, alpha=0.55, label=tr("measured"))
-    axes.plot(at_s, found.simulated.output[shown], color=look.run, linewidth=0.9, label=tr("ŷ, simulated"))
+def _output(axes: Axes, look: Style, validation: Validation, last: bool) -> None:
+    shown = slice(max(0, validation.samples - _SHOWN), validation.samples)
+    at_s = np.arange(validation.samples)[shown] / validation.rate_hz
+    axes.plot(at_s, validation.measured[shown], color=look.newest, linewidth=2.6, alpha=0.55, label=tr("measured"))
+    axes.plot(at_s, validation.simulated.output[shown], color=look.run, linewidth=0.9, label=tr("ŷ, simulated"))
     axes.set_title(
         tr(
             "{model}: {verdict}, fit {percent:.1f} %",
-            model=worded(found.model), verdict=worded(found.verdict), percent=found.fit_percent,
+            model=worded(validation.model), verdict=worded(validation.verdict), percent=validation.fit_percent,
         ),
         loc="left", size=10, color=look.ink,
     )  # fmt: skip
-    axes.set_ylabel(shortened(found.output, 30))
+    axes.set_ylabel(shortened(validation.output, 30))
     if last:
         axes.set_xlabel(tr("time in s"))
     axes.legend(loc="upper right", ncols=2, borderpad=0.2)
@@ -106,8 +106,8 @@ def _correlation(axes: Axes, look: Style, c: Correlation, counts: bool, last: bo
     outside = c.judged & (np.abs(c.value) > c.limit) & ~beyond
     axes.plot(c.lags[outside], c.value[outside], "o", markersize=3, color=look.newest)
     for sign, mark in ((1, "^"), (-1, "v")):
-        at = c.lags[beyond & (np.sign(c.value) == sign)]
-        axes.plot(at, np.full(len(at), 0.96 * sign * reach), mark, markersize=4, color=look.newest)
+        lags = c.lags[beyond & (np.sign(c.value) == sign)]
+        axes.plot(lags, np.full(len(lags), 0.96 * sign * reach), mark, markersize=4, color=look.newest)
     axes.set_ylim(-reach, reach)
     axes.set_ylabel(tr("correlation"))
     share = tr("{percent:.0f} % inside", percent=100 * c.share) if counts else tr("does not count")

@@ -8,12 +8,89 @@ from math import ceil
 import numpy as np
 
 from livebode.arrays import Floats
-from livebode.core import DesignError, Lines, UsageError
-from livebode.excitation import low_crest_phases
-from livebode.mimo import MatrixExcitation
-from livebode_design.matrix.amplitude import best_amplitudes
+from livebode.core import DesignError, Lines, UsageError, needing
+from livebode.excitation import MatrixExcitation, low_crest_phases
 from livebode_design.matrix.machine import LimitedPeak, MatrixLimits, MatrixMachine
 from livebode_design.matrix.spec import Kind, MatrixSpec
+
+_ROUNDS = 40
+_TOLERANCE = 1e-5  # of a limit, and of the largest cost
+
+
+def best_amplitudes(cost: Floats, peaks: Floats) -> Floats:
+    """a > 0 that minimises the largest Σ_j cost[r, j]/a_j² with |Σ_j peaks[s, t, j]·a_j| ≤ 1, shape (inputs,).
+
+    The costs are convex in a and the limits linear, so the minimum is the only one. SciPy's SLSQP solves it for few
+    rows and samples; those that its solution violates most are added until there are none.
+
+    Parameters
+    ----------
+    cost
+        At least 0, shape (rows, inputs).
+    peaks
+        Signals as a share of their limits, shape (signals, samples, inputs).
+
+    Examples
+    --------
+    Two inputs that share one limit, of which the second is four times as costly:
+
+    >>> best_amplitudes(np.array([[1.0, 8.0]]), np.array([[[1.0, 1.0]]])).round(4)
+    array([0.3333, 0.6667])
+    """
+    inputs = cost.shape[1]
+    alone = np.abs(peaks).max(axis=(0, 1))
+    scale = 1 / (inputs * np.where(alone > 0, alone, 1.0))
+    price, reach = cost / scale**2, peaks * scale
+    limits, rows = np.empty((0, inputs)), np.empty((0, inputs))
+    a = np.ones(inputs)
+    for _ in range(_ROUNDS):
+        seen = reach @ a
+        worst = np.abs(seen).argmax(axis=1)
+        sample = np.arange(len(seen))
+        violated = np.abs(seen[sample, worst]) > (1 + _TOLERANCE if len(limits) else 0)
+        value = price @ a**-2.0
+        known = (rows @ a**-2.0).max() if len(rows) else 0.0
+        if not violated.any() and value.max() <= known * (1 + _TOLERANCE):
+            break
+        signs = np.sign(seen[sample, worst])[:, None]
+        limits = np.vstack([limits, (signs * reach[sample, worst])[violated]])
+        rows = np.vstack([rows, price[[value.argmax()]]])
+        a = _solved(rows, limits, a)
+    return np.asarray(a * scale / np.abs(reach @ a).max())
+
+
+def _solved(rows: Floats, limits: Floats, begin: Floats) -> Floats:
+    """The minimum for these rows and limits only, in a and t ≥ log(cost)."""
+    with needing("SciPy", "analysis", "a design for several inputs"):
+        from scipy.optimize import minimize
+
+    inside = begin / max(1.0, float((limits @ begin).max()))
+    start = np.append(inside, np.log((rows @ inside**-2.0).max()))
+    constraints = [
+        {
+            "type": "ineq",
+            "fun": lambda x: x[-1] - np.log(rows @ x[:-1] ** -2.0),
+            "jac": lambda x: np.hstack(
+                [2 * rows * x[:-1] ** -3.0 / (rows @ x[:-1] ** -2.0)[:, None], np.ones((len(rows), 1))]
+            ),
+        },
+        {
+            "type": "ineq",
+            "fun": lambda x: 1 - limits @ x[:-1],
+            "jac": lambda _: np.hstack([-limits, np.zeros((len(limits), 1))]),
+        },
+    ]
+    solution = minimize(  # type: ignore[call-overload]
+        lambda x: float(x[-1]),
+        start,
+        jac=lambda _: np.eye(len(start))[-1],
+        bounds=[*[(1e-6, 1e6)] * len(inside), (None, None)],
+        constraints=constraints,
+        method="SLSQP",
+        options={"maxiter": 200, "ftol": 1e-10},
+    )
+    return np.asarray(solution.x[:-1], dtype=np.float64)
+
 
 RESERVE = 0.1
 """Share of each limit that remains for errors of the prediction and for noise."""
@@ -70,12 +147,12 @@ def candidate(kind: Kind, spec: MatrixSpec, machine: MatrixMachine, limits: Matr
     phases = _phases(kind, lines, len(machine.inputs), spec.seed)
     settle = spec.settle_periods or 1
     for _ in range(_TRIES):
-        found = _at(kind, spec, machine, limits, lines, phases, settle)
-        needed = _settle(found, spec, machine)
+        experiments = _at(kind, spec, machine, limits, lines, phases, settle)
+        needed = _settle(experiments, spec, machine)
         if spec.settle_periods is not None or needed <= settle:
             break
         settle = needed
-    return found
+    return experiments
 
 
 def _phases(kind: Kind, lines: Lines, inputs: int, seed: int) -> Floats:
@@ -112,7 +189,7 @@ def _at(
     cost = _cost(unit, spec, machine)
     amplitude = best_amplitudes(cost.reshape(-1, cost.shape[-1]), signals / (1 - RESERVE))
     sizes = np.abs(signals @ amplitude).max(axis=1)
-    reached = tuple(replace(one, size=float(size * one.limit)) for one, size in zip(peaks, sizes))
+    reached = tuple(replace(peak, size=float(size * peak.limit)) for peak, size in zip(peaks, sizes))
     ratio = np.sqrt(cost @ amplitude**-2.0)
     if not np.isfinite(ratio).all() or not 0 < ratio.max() < _RATIO_MAX:
         raise UsageError(
@@ -140,19 +217,19 @@ def _cost(unit: MatrixExcitation, spec: MatrixSpec, machine: MatrixMachine) -> F
     return np.asarray(noise * spread[:, None, :, :] / wanted[..., None] ** 2)
 
 
-def _settle(found: Candidate, spec: MatrixSpec, machine: MatrixMachine) -> int:
+def _settle(candidate: Candidate, spec: MatrixSpec, machine: MatrixMachine) -> int:
     """Periods in which a transient decays below the noise of a line, after all repetitions."""
-    lines = found.excitation.lines
+    lines = candidate.excitation.lines
     line_noise = (
-        machine.deviation(lines.frequency_hz).min(axis=0) * 2 / np.sqrt(lines.window * repetitions(found, spec))
+        machine.deviation(lines.frequency_hz).min(axis=0) * 2 / np.sqrt(lines.window * repetitions(candidate, spec))
     )
-    return int(np.clip(machine.settle_periods(found.excitation, SETTLED * line_noise), 1, _SETTLE_MAX))
+    return int(np.clip(machine.settle_periods(candidate.excitation, SETTLED * line_noise), 1, _SETTLE_MAX))
 
 
-def repetitions(found: Candidate, spec: MatrixSpec) -> int:
+def repetitions(candidate: Candidate, spec: MatrixSpec) -> int:
     """How often the experiments are played: until the required sigma, or while there is time."""
     if spec.requires:
-        return found.needed
+        return candidate.needed
     assert spec.time_s is not None
-    in_time = int(spec.time_s / found.repetition_s * (1 + 1e-12))
+    in_time = int(spec.time_s / candidate.repetition_s * (1 + 1e-12))
     return min(REPETITIONS_MAX, max(REPETITIONS_MIN, in_time))

@@ -12,8 +12,8 @@ from annotated_types import Gt
 from numpy.typing import ArrayLike
 
 from livebode.arrays import Complex, Floats
-from livebode.core import UsageError
-from livebode.mimo import MatrixExcitation, MatrixLoop
+from livebode.core import MatrixLoop, UsageError
+from livebode.excitation import MatrixExcitation
 
 _Positive = Annotated[float, Gt(0)]
 _Each = _Positive | Sequence[_Positive]
@@ -59,7 +59,7 @@ class MatrixMachine(ABC):
     @property
     @abstractmethod
     def rate_hz(self) -> float:
-        """Of the recording."""
+        """Rate of the recording."""
 
     @property
     @abstractmethod
@@ -83,7 +83,7 @@ class MatrixMachine(ABC):
 
     @abstractmethod
     def response(self, frequency_hz: ArrayLike) -> Complex:
-        """Of the plant, shape (lines, outputs, inputs)."""
+        """Response of the plant, shape (lines, outputs, inputs)."""
 
     @abstractmethod
     def deviation(self, frequency_hz: ArrayLike) -> Floats:

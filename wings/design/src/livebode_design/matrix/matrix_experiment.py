@@ -111,20 +111,20 @@ class MatrixExperiment(BaseModel):
         data = read_table(path)
         if isinstance(given := data.get("excitation", {}), dict):
             data["excitation"] = given | dict(over or {})
-        found = cls.of(data, str(path))
-        if found.measured_matrix is None:
-            return found
-        there = found.measured_matrix.model_copy(update={"run": path.parent / found.measured_matrix.run})
-        return found.model_copy(update={"measured_matrix": there})
+        experiment = cls.of(data, str(path))
+        if experiment.measured_matrix is None:
+            return experiment
+        there = experiment.measured_matrix.model_copy(update={"run": path.parent / experiment.measured_matrix.run})
+        return experiment.model_copy(update={"measured_matrix": there})
 
     @classmethod
     def of(cls, data: Mapping[str, Any], origin: str) -> MatrixExperiment:
         """The experiment in plain data; `origin` names it in messages."""
         try:
-            found = cls.model_validate(data)
+            experiment = cls.model_validate(data)
         except ValidationError as error:
             raise first_of(error, {"": MatrixExperiment}).at(origin) from None
-        described = [name for name in TABLES if getattr(found, name) is not None]
+        described = [name for name in TABLES if getattr(experiment, name) is not None]
         if len(described) != 1:
             raise ConfigError(
                 "key-conflict",
@@ -132,18 +132,18 @@ class MatrixExperiment(BaseModel):
                 f"describe it by one of {', '.join(f'[{name}]' for name in TABLES)}",
                 key=(described or ["gantry"])[0],
             ).at(origin)
-        if found.measured_matrix is None and found.drives is None:
+        if experiment.measured_matrix is None and experiment.drives is None:
             raise ConfigError(
                 "key-missing", "[drives] is missing", "describe the controllers and the noise", key="drives"
             ).at(origin)
-        if found.measured_matrix is not None and found.drives is not None:
+        if experiment.measured_matrix is not None and experiment.drives is not None:
             raise ConfigError(
                 "key-conflict",
                 "[drives] and [measured_matrix] both describe the controllers",
                 "remove [drives]",
                 key="drives",
             ).at(origin)
-        return found
+        return experiment
 
     def spec(self) -> MatrixSpec:
         """Specification from [excitation]."""

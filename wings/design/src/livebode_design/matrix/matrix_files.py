@@ -65,10 +65,10 @@ def write_npz(path: Path, design: MatrixDesign, name: str) -> None:
 
 def write_mat(path: Path, design: MatrixDesign, name: str) -> None:
     """A MATLAB v5 file with one struct of that name; `samples` has a column for each input, `Ts` is in seconds."""
-    found = _arrays(design)
-    struct = found | {
-        "samples": found["samples"].T,
-        "frequency_hz": found["frequency_hz"][:, np.newaxis],
+    arrays = _arrays(design)
+    struct = arrays | {
+        "samples": arrays["samples"].T,
+        "frequency_hz": arrays["frequency_hz"][:, np.newaxis],
         "Ts": 1 / design.excitation.lines.rate_hz,
     }
     write_struct(path, struct, name)

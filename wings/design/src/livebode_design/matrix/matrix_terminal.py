@@ -25,17 +25,19 @@ def show_matrix_design(design: MatrixDesign) -> None:
 def _show_alternatives(terminal: Console, design: MatrixDesign) -> None:
     worst = "largest sigma" if design.spec.requires else "largest 95 % bound"
     table = plain_table("experiments", "settle", "repetitions", "time", "amplitudes", worst, "limited by")
-    for one in design.alternatives:
-        share = f"{one.share:.3g} of the required" if design.spec.requires else f"{100 * one.share:.3g} %"
-        sizes = ", ".join(f"{a:.3g}" for a in one.amplitude_n_m)
+    for alternative in design.alternatives:
+        share = (
+            f"{alternative.share:.3g} of the required" if design.spec.requires else f"{100 * alternative.share:.3g} %"
+        )
+        sizes = ", ".join(f"{a:.3g}" for a in alternative.amplitude_n_m)
         table.add_row(
-            one.kind,
-            str(one.settle_periods),
-            str(one.repetitions),
-            f"{one.time_s:.4g} s",
+            alternative.kind,
+            str(alternative.settle_periods),
+            str(alternative.repetitions),
+            f"{alternative.time_s:.4g} s",
             f"{sizes} N m",
             share,
-            ", ".join(one.limited_by),
+            ", ".join(alternative.limited_by),
         )
     terminal.print(table)
 

@@ -10,10 +10,9 @@ from annotated_types import Gt
 from pydantic import BaseModel, ConfigDict
 
 from livebode.configuration import ControllerSection, recorded_configuration, without_null
-from livebode.core import ConfigError, Model, split_plant_unit
-from livebode.mimo import MatrixLoop
+from livebode.core import ConfigError, MatrixLoop, Model, split_plant_unit
 from livebode.records import RunRecord
-from livebode_design.matrix.measured import MeasuredMachine
+from livebode_design.matrix.measured_machine import MeasuredMachine
 
 _Positive = Annotated[float, Gt(0)]
 _LOOP = ("input_logged", "excitation_logged", "output_logged")
@@ -86,12 +85,12 @@ def measured_machine(section: MeasuredMatrixSection) -> MeasuredMachine:
 def loop_of(section: MeasuredMatrixSection) -> dict[str, Any]:
     """[loop] of the run."""
     loop = recorded_configuration(RunRecord.open(section.run, matrix=True).summary).get("loop", {})
-    controllers = [without_null(one) for one in loop.get("controllers", [])]
+    controllers = [without_null(controller) for controller in loop.get("controllers", [])]
     return {name: loop[name] for name in _LOOP if name in loop} | {"controllers": controllers}
 
 
 def _loop(described: dict[str, Any], outputs: tuple[str, ...], inputs: tuple[str, ...], rate_hz: float) -> MatrixLoop:
-    controllers = [ControllerSection.model_validate(one) for one in described.get("controllers", [])]
+    controllers = [ControllerSection.model_validate(controller) for controller in described.get("controllers", [])]
     if not controllers:
         raise ConfigError(
             "key-missing",
@@ -100,6 +99,6 @@ def _loop(described: dict[str, Any], outputs: tuple[str, ...], inputs: tuple[str
             key="measured_matrix.run",
         )
     feedback: list[list[Model | None]] = [[None] * len(outputs) for _ in inputs]
-    for one in controllers:
-        feedback[inputs.index(one.input)][outputs.index(one.output)] = one.build(rate_hz)
+    for controller in controllers:
+        feedback[inputs.index(controller.input)][outputs.index(controller.output)] = controller.build(rate_hz)
     return MatrixLoop(feedback=feedback)

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from livebode.arrays import Complex, Floats
-from livebode.core import CHANNELS_MAX, UsageError, counted
-from livebode.mimo import MatrixExcitation, MatrixLoop
+from livebode.core import CHANNELS_MAX, MatrixLoop, UsageError, counted
+from livebode.excitation import MatrixExcitation
 from livebode.simulation import MotorLoop
 from livebode_design.matrix.machine import MatrixMachine, each_of
 
@@ -50,7 +50,7 @@ class MechanismMachine(MatrixMachine):
                 "describe one motor as [belt]",
                 argument="input_shapes",
             )
-        finite = all(np.isfinite(one).all() for one in (*self.loop.mechanism.state_space, *self.loop.matrices))
+        finite = all(np.isfinite(matrix).all() for matrix in (*self.loop.mechanism.state_space, *self.loop.matrices))
         if not finite or not np.any(self.response([1.0])):
             raise UsageError(
                 "out-of-range",
@@ -68,7 +68,7 @@ class MechanismMachine(MatrixMachine):
 
     @property
     def rate_hz(self) -> float:
-        """Of the drives."""
+        """Rate of the drives."""
         return self.loop.rate_hz
 
     @property
@@ -83,7 +83,7 @@ class MechanismMachine(MatrixMachine):
 
     @property
     def outputs(self) -> tuple[tuple[str, str], ...]:
-        """Names and units."""
+        """Names and units of the outputs."""
         return self.loop.mechanism.outputs
 
     @property
@@ -94,11 +94,11 @@ class MechanismMachine(MatrixMachine):
         return MatrixLoop(feedback=rows)
 
     def response(self, frequency_hz: ArrayLike) -> Complex:
-        """Of the plant, shape (lines, outputs, inputs)."""
+        """Response of the plant, shape (lines, outputs, inputs)."""
         return self.loop.mechanism.response(frequency_hz, self.loop.rate_hz)
 
     def deviation(self, frequency_hz: ArrayLike) -> Floats:
-        """The same at each line."""
+        """Deviation of the noise, the same at each line."""
         each = each_of(self.noise, len(self.outputs), "noise", "output")
         return np.broadcast_to(each, (np.size(frequency_hz), len(each)))
 

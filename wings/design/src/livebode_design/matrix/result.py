@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from livebode.arrays import Complex, Floats
-from livebode.mimo import MatrixExcitation
+from livebode.excitation import MatrixExcitation
 from livebode_design.matrix.machine import LimitedPeak, MatrixLimits, MatrixMachine
 from livebode_design.matrix.spec import HOLDING_95, MatrixSpec
 
@@ -125,6 +125,6 @@ class MatrixDesign:
             "sigma": self.sigma.tolist(),
             "bound_95": self.bound.tolist(),
             "peaks": [asdict(peak) for peak in self.peaks],
-            "alternatives": [asdict(one) for one in self.alternatives],
-            "choices": [asdict(one) for one in self.choices],
+            "alternatives": [asdict(alternative) for alternative in self.alternatives],
+            "choices": [asdict(choice) for choice in self.choices],
         }

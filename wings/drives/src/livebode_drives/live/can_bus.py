@@ -81,7 +81,7 @@ class CanSource(LiveSource):
             self._foreign.clear()
             try:
                 while not self._stop.is_set():
-                    self._take_frames(self._waiting(bus))
+                    self._process_frames(self._waiting(bus))
                     self._stop.wait(TOGETHER_S)
             except self._can.CanError as error:
                 raise ConnectionError(str(error)) from None
@@ -115,21 +115,21 @@ class CanSource(LiveSource):
             frame = bus.recv(0.0) if len(frames) < FRAMES_MAX else None
         return frames
 
-    def _take_frames(self, frames: list[Any]) -> None:
-        found: list[NumberedSample] = []
+    def _process_frames(self, frames: list[Any]) -> None:
+        samples: list[NumberedSample] = []
         try:
             for frame in frames:
-                found += self._samples_with(frame)
+                samples += self._samples_with(frame)
         finally:  # also what came before the controller left the bus
-            self._pass_on(found)
+            self._pass_on(samples)
 
     def _samples_with(self, frame: Any) -> list[NumberedSample]:
         """The samples that are certain with this frame."""
         identity = (frame.arbitration_id, frame.is_extended_id)
         if frame.is_error_frame:
-            self._take_error(frame.arbitration_id)
+            self._process_error(frame.arbitration_id)
         elif identity not in self._samples.identities or frame.is_remote_frame:
-            self._take_foreign(identity)
+            self._process_foreign(identity)
         else:
             try:
                 return self._samples.process(identity, bytes(frame.data), frame.timestamp)
@@ -137,18 +137,18 @@ class CanSource(LiveSource):
                 self._malformed(error)
         return []
 
-    def _pass_on(self, found: list[NumberedSample]) -> None:
+    def _pass_on(self, samples: list[NumberedSample]) -> None:
         for problem in self._samples.problems:
             self._malformed(problem)
         self._samples.problems.clear()
-        if found:
-            self._count += len(found)
+        if samples:
+            self._count += len(samples)
             self._rate.add(self._count, time.monotonic())
             self._foreign.clear()
-        for batch in batches_of(found, self._samples.channels, self._rate_given, time.monotonic()):
+        for batch in batches_of(samples, self._samples.channels, self._rate_given, time.monotonic()):
             self._deliver(batch)
 
-    def _take_error(self, number: int) -> None:
+    def _process_error(self, number: int) -> None:
         """An error frame, whose identifier has a bit for each error, as in Linux's can/error.h."""
         if number & _BUS_OFF:
             raise ConnectionError(_LEFT)
@@ -156,7 +156,7 @@ class CanSource(LiveSource):
         if not number & _RESTARTED:
             self._malformed(f"error frame: {', '.join(causes)}")
 
-    def _take_foreign(self, identity: Identity) -> None:
+    def _process_foreign(self, identity: Identity) -> None:
         self._foreign[identity] += 1
         if self._foreign.total() >= FOREIGN_FRAMES:
             seen = ", ".join(f"0x{number:X}" for (number, _), _ in self._foreign.most_common(_SHOWN))

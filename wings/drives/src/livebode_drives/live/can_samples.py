@@ -89,12 +89,12 @@ def signals_of(headings: list[str], messages: Mapping[Identity, Any], dbc: Path 
     ConfigError
         If no channel is named, or one is not in the DBC, in several messages, or multiplexed.
     """
-    found: dict[str, list[Signal]] = {}
+    by_name: dict[str, list[Signal]] = {}
     for identity, message in messages.items():
         for signal in () if message.is_multiplexed() else message.signals:
             for name in (signal.name, f"{message.name}.{signal.name}"):
-                found.setdefault(name, []).append(Signal(Channel(name, signal.unit or ""), identity, signal.name))
-    full = sorted(name for name in found if "." in name)
+                by_name.setdefault(name, []).append(Signal(Channel(name, signal.unit or ""), identity, signal.name))
+    full = sorted(name for name in by_name if "." in name)
     if not headings:
         raise ConfigError(
             "key-missing",
@@ -103,12 +103,12 @@ def signals_of(headings: list[str], messages: Mapping[Identity, Any], dbc: Path 
             key="source",
             keys=["channels"],
         )
-    return [_signal(heading, found, full) for heading in headings]
+    return [_signal(heading, by_name, full) for heading in headings]
 
 
-def _signal(heading: str, found: dict[str, list[Signal]], full: list[str]) -> Signal:
+def _signal(heading: str, by_name: dict[str, list[Signal]], full: list[str]) -> Signal:
     name, unit = split_unit(heading)
-    same = found.get(name, [])
+    same = by_name.get(name, [])
     if len(same) != 1:
         wrong = f"is a signal of {len(same)} messages" if same else "is not a signal of the DBC, or is multiplexed"
         remedy = f"write {' or '.join(f for f in full if f.endswith('.' + name))}" if same else nearest_name(name, full)
@@ -190,11 +190,11 @@ class CanSamples:
         values = self._decoded(identity, data)
         if self._counter is not None and self._counted is not None:
             row = np.array([values[signal.name] for signal in self.signals], dtype=np.float64)
-            found = self._counter.process(int(values[self._counted.name]), time_s, row)
+            samples = self._counter.process(int(values[self._counted.name]), time_s, row)
             if self._counter.damaged:
                 self.problems.append(f"{self._counter.damaged} frames had a counter that no other frame confirmed")
                 self._counter.damaged = 0
-            return found
+            return samples
         return self._timed(identity, values, time_s)
 
     def _decoded(self, identity: Identity, data: bytes) -> dict[str, float]:
@@ -268,8 +268,8 @@ class CanSamples:
 
 def counted_signal(signals: list[Signal], counter: str, messages: Mapping[Identity, Any]) -> Signal:
     """The signal of the counter; ConfigError if it is not a channel, or another channel is in another message."""
-    found = next((signal for signal in signals if signal.channel.name == counter), None)
-    if found is None:
+    counted = next((signal for signal in signals if signal.channel.name == counter), None)
+    if counted is None:
         raise ConfigError(
             "value-invalid",
             f"source.counter = {counter!r} is not one of source.channels",
@@ -277,17 +277,17 @@ def counted_signal(signals: list[Signal], counter: str, messages: Mapping[Identi
             key="source.counter",
             value=counter,
         )
-    other = next((signal for signal in signals if signal.identity != found.identity), None)
+    other = next((signal for signal in signals if signal.identity != counted.identity), None)
     if other is not None:
         raise ConfigError(
             "value-invalid",
-            f"source.counter = {counter!r} counts the frames of {messages[found.identity].name}, but the channel "
+            f"source.counter = {counter!r} counts the frames of {messages[counted.identity].name}, but the channel "
             f"{other.channel.name!r} is in {messages[other.identity].name}",
             "remove it: frames of several messages are put together by their times",
             key="source.counter",
             value=counter,
         )
-    return found
+    return counted
 
 
 def modulus_of(signal: Signal, messages: Mapping[Identity, Any]) -> int:

@@ -52,16 +52,16 @@ class Counter:
     def process(self, count: int, time_s: float, row: NDArray[np.float64]) -> list[NumberedSample]:
         """The samples that are certain with this one: its counter, its time on any clock, and its values."""
         doubtful, self._doubtful = self._doubtful, None
-        found = []
+        accepted = []
         if doubtful is not None:
             if self._confirmed(doubtful[0], count):
-                found.append(self._accepted(*doubtful))
+                accepted.append(self._accepted(*doubtful))
             else:
                 self.damaged += 1
         if self._last is not None and self._ahead(self._last[0], count) == 1:
-            return [*found, self._accepted(count, time_s, row)]
+            return [*accepted, self._accepted(count, time_s, row)]
         self._doubtful = count, time_s, row
-        return found
+        return accepted
 
     def _confirmed(self, doubtful: int, count: int) -> bool:
         if self._ahead(doubtful, count) == 1:

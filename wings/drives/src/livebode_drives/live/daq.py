@@ -55,7 +55,7 @@ def clock_of(signal: Any) -> SampleClock | None:
     return SampleClock(resolution.numerator / resolution.denominator, delta)
 
 
-def chosen_signals(found: dict[str, Any], headings: list[str]) -> list[tuple[Channel, Any]]:
+def chosen_signals(by_heading: dict[str, Any], headings: list[str]) -> list[tuple[Channel, Any]]:
     """The signals of these channels, or all that share the clock of the first.
 
     Parameters
@@ -70,19 +70,19 @@ def chosen_signals(found: dict[str, Any], headings: list[str]) -> list[tuple[Cha
     SourceError
         With the code "refused" where a signal is missing, or is sampled by another clock than the first.
     """
-    if not found:
+    if not by_heading:
         raise _refusal("the device has no signal that is sampled at regular times", "check source.url")
     if not headings:
-        clock = clock_of(next(iter(found.values())))
-        headings = [name for name, signal in found.items() if clock_of(signal) == clock][:CHANNELS_MAX]
+        clock = clock_of(next(iter(by_heading.values())))
+        headings = [name for name, signal in by_heading.items() if clock_of(signal) == clock][:CHANNELS_MAX]
     chosen = []
     for heading in headings:
         name, unit = split_unit(heading)
-        if name not in found:
-            raise _refusal(f"the device has no sampled signal {name!r}", nearest_name(name, list(found)[:_LISTED]))
-        descriptor = found[name].descriptor
+        if name not in by_heading:
+            raise _refusal(f"the device has no sampled signal {name!r}", nearest_name(name, list(by_heading)[:_LISTED]))
+        descriptor = by_heading[name].descriptor
         own = descriptor.unit.symbol if descriptor is not None and descriptor.unit is not None else ""
-        chosen.append((Channel(name, unit or own), found[name]))
+        chosen.append((Channel(name, unit or own), by_heading[name]))
     clocks = [clock_of(signal) for _, signal in chosen]
     for (channel, _), clock in zip(chosen, clocks):
         if clock != clocks[0]:
@@ -158,11 +158,11 @@ class DaqSource(LiveSource):
         except RuntimeError as error:
             raise ConnectionError(str(error)) from None
         try:
-            found = {}
+            signals = {}
             for signal in device.signals_recursive:
                 if clock_of(signal) is not None:
-                    found[signal.name if signal.name not in found else signal.global_id] = signal
-            chosen = chosen_signals(found, self.settings.channels)
+                    signals[signal.name if signal.name not in signals else signal.global_id] = signal
+            chosen = chosen_signals(signals, self.settings.channels)
             self._established()
             self._read([signal for _, signal in chosen], tuple(channel for channel, _ in chosen))
         finally:
@@ -193,8 +193,8 @@ class DaqSource(LiveSource):
                 together.dropped = 0
             most = VALUES_MAX // len(channels)
             for first, data in runs:
-                for at in range(0, data.shape[1], most):
-                    self._deliver(Batch(first + at, data[:, at : at + most], channels, clock.rate_hz))
+                for start in range(0, data.shape[1], most):
+                    self._deliver(Batch(first + start, data[:, start : start + most], channels, clock.rate_hz))
 
     def _numbers(self, ticks: np.ndarray[Any, Any], clock: SampleClock) -> np.ndarray[Any, np.dtype[np.int64]]:
         if self._phase is None:

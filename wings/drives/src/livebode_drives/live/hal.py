@@ -73,8 +73,8 @@ class HalSource(LiveSource):
 
     def __init__(self, settings: DriveKeys, address: Address) -> None:
         super().__init__(settings, address)
-        found = _ADDRESS.fullmatch(address.path)
-        if found is None:
+        parts = _ADDRESS.fullmatch(address.path)
+        if parts is None:
             raise ConfigError(
                 "value-invalid",
                 f"source.url = {str(address)[:80]!r} names no sampler of HAL",
@@ -89,7 +89,7 @@ class HalSource(LiveSource):
                 key="source",
                 keys=["sample_signal"],
             )
-        self._number = int(found[1])
+        self._number = int(parts[1])
         self._sampler = f"sampler.{self._number}"
         self._wanted = named_channels(settings.channels)
 
@@ -141,14 +141,14 @@ class HalSource(LiveSource):
 
     def _running(self, users: int) -> Fifo:
         """The FIFO with so many users; ConnectionError if the real-time part is not there, or another reads, too."""
-        found = fifo(SAMPLER_KEY + self._number)
-        if found is None:
+        ring = fifo(SAMPLER_KEY + self._number)
+        if ring is None:
             raise ConnectionError(f"no {self._sampler} is loaded: start LinuxCNC, or halcmd loadrt sampler")
-        if found.users < users:
+        if ring.users < users:
             raise ConnectionError(f"the real-time part of LinuxCNC has ended (rtapi_app, which runs {self._sampler})")
-        if found.users > users:
+        if ring.users > users:
             raise ConnectionError(f"another program reads {self._sampler}: end the other halsampler")
-        return found
+        return ring
 
     def _position(self, name: str | None, signals: list[str]) -> int:
         if name not in signals:
@@ -227,12 +227,12 @@ class SampleText:
 
         A line "overrun" is left out: halsampler prints it when it starts, and not where samples are missing.
         """
-        ready, newline, rest = piece.rpartition(b"\n")
+        ready, newline, remainder = piece.rpartition(b"\n")
         if not newline:
-            ready, rest = b"", self._rest + rest
+            ready, remainder = b"", self._rest + remainder
         else:
             ready = self._rest + ready
-        self._rest = rest[-_PIECE_BYTES:]
+        self._rest = remainder[-_PIECE_BYTES:]
         words = ready.replace(b"overrun", b"").split()
         try:
             values = np.array([float(word) for word in words], dtype=np.float64).reshape(-1, self._pins)

@@ -89,14 +89,14 @@ def last_line(text: str) -> str:
 
 def signals_at(component: str) -> list[str]:
     """Names of the signals at the data pins of a component such as sampler.0, in order; "" for an open pin."""
-    found = {}
+    signals = {}
     for line in halcmd("show", "pin", f"{component}.pin.").splitlines():
         fields = line.split()
-        at = next((i for i, field in enumerate(fields) if field.startswith(f"{component}.pin.")), None)
-        if at is not None:
-            number = fields[at].removeprefix(f"{component}.pin.")
-            found[int(number)] = fields[at + 2] if len(fields) > at + 2 else ""
-    return [found[number] for number in sorted(found)]
+        position = next((i for i, field in enumerate(fields) if field.startswith(f"{component}.pin.")), None)
+        if position is not None:
+            number = fields[position].removeprefix(f"{component}.pin.")
+            signals[int(number)] = fields[position + 2] if len(fields) > position + 2 else ""
+    return [signals[number] for number in sorted(signals)]
 
 
 def period_ns(function: str) -> int:
@@ -124,12 +124,12 @@ class Link:
 
 def links() -> dict[str, Link]:
     """The signals of HAL by name."""
-    found = {}
+    by_signal = {}
     for line in halcmd("show", "sig").splitlines():
         fields = line.split()
         if len(fields) < 3:
             continue
         arrows = dict(zip(fields[4::2], fields[3::2]))
         writer = next((pin for pin, arrow in arrows.items() if arrow == "<=="), "")
-        found[fields[2]] = Link(fields[2], writer, tuple(pin for pin, arrow in arrows.items() if arrow == "==>"))
-    return found
+        by_signal[fields[2]] = Link(fields[2], writer, tuple(pin for pin, arrow in arrows.items() if arrow == "==>"))
+    return by_signal

@@ -78,10 +78,10 @@ class Moves:
         """
         times_s = np.asarray(np.arange(first - SIDE, first + numbers + SIDE) / rate_hz, dtype=np.float64)
         position = self._displacement(times_s)
-        found = np.zeros((_AXES, numbers))
-        for at, weight in enumerate(_SECOND_DERIVATIVE):
-            found += weight * position[:, at : at + numbers]
-        return found * rate_hz**2
+        total = np.zeros((_AXES, numbers))
+        for shift, weight in enumerate(_SECOND_DERIVATIVE):
+            total += weight * position[:, shift : shift + numbers]
+        return total * rate_hz**2
 
     def forget(self, time_s: float) -> None:
         """Drop the moves that ended before this print time."""
@@ -95,9 +95,9 @@ class Moves:
         duration_s, speed, acceleration, direction = moves[:, 1], moves[:, 2], moves[:, 3], moves[:, 4:]
         paths = (speed * duration_s + 0.5 * acceleration * duration_s**2)[:, None] * direction
         before = np.concatenate([np.zeros((1, _AXES)), np.cumsum(paths, axis=0)])
-        at = np.searchsorted(moves[:, 0], time_s, side="right") - 1
-        move = np.maximum(at, 0)
-        since_s = np.where(at >= 0, np.minimum(time_s - moves[move, 0], duration_s[move]), 0.0)
+        index = np.searchsorted(moves[:, 0], time_s, side="right") - 1
+        move = np.maximum(index, 0)
+        since_s = np.where(index >= 0, np.minimum(time_s - moves[move, 0], duration_s[move]), 0.0)
         path = speed[move] * since_s + 0.5 * acceleration[move] * since_s**2
         return np.asarray((before[move] + path[:, None] * direction[move]).T)
 
@@ -181,12 +181,12 @@ class KlipperSource(LiveSource):
             buffer = bytearray()
             for piece in pieces(link, self._stop, "Klipper"):
                 buffer += piece
-                *messages, rest = buffer.split(END)
-                buffer = bytearray(rest)
+                *messages, remainder = buffer.split(END)
+                buffer = bytearray(remainder)
                 if len(buffer) > MESSAGE_BYTES_MAX:
                     raise ConnectionError(f"a message is longer than {MESSAGE_BYTES_MAX} bytes")
                 for message in messages:
-                    self._take_message(bytes(message))
+                    self._process_message(bytes(message))
         return False
 
     def _begin(self) -> None:
@@ -207,7 +207,7 @@ class KlipperSource(LiveSource):
             for id_, (method, params) in enumerate(calls)
         )
 
-    def _take_message(self, message: bytes) -> None:
+    def _process_message(self, message: bytes) -> None:
         try:
             fields = json.loads(message)
             if not isinstance(fields, dict):
@@ -216,7 +216,7 @@ class KlipperSource(LiveSource):
             self._malformed(f"{len(message)} bytes are not a JSON object")
             return
         if "id" in fields:
-            self._take_answer(fields)
+            self._process_answer(fields)
             return
         params = fields.get("params")
         if not isinstance(params, dict):
@@ -224,15 +224,15 @@ class KlipperSource(LiveSource):
             return
         try:
             if fields.get("of") == 0:
-                self._take_samples(params)
+                self._process_samples(params)
             elif fields.get("of") == 1:
-                self._take_moves(params)
+                self._process_moves(params)
         except LivebodeError as error:
             if error.code == "source.refused":
                 raise
             self._malformed(error)
 
-    def _take_answer(self, fields: dict[str, Any]) -> None:
+    def _process_answer(self, fields: dict[str, Any]) -> None:
         """The answer to a subscription; ConnectionError if it is refused, since Klipper may still be starting."""
         if "error" in fields:
             error = fields["error"]
@@ -246,7 +246,7 @@ class KlipperSource(LiveSource):
         if len(self._answered) == 2:
             self._established()
 
-    def _take_samples(self, params: dict[str, Any]) -> None:
+    def _process_samples(self, params: dict[str, Any]) -> None:
         rows = _samples(params.get("data"))
         overflows = params.get("overflows", 0)
         if overflows != self._overflows:
@@ -284,7 +284,7 @@ class KlipperSource(LiveSource):
                 rate_hz=self._rate_given,
             )
 
-    def _take_moves(self, params: dict[str, Any]) -> None:
+    def _process_moves(self, params: dict[str, Any]) -> None:
         begins_s = self._moves.add(params.get("data"))
         if begins_s < self._passed_s:
             self._malformed(
@@ -314,17 +314,17 @@ class KlipperSource(LiveSource):
 def _samples(rows: object) -> NDArray[np.float64]:
     """Rows of time and three accelerations, shape (samples, 4); SourceError if they are not."""
     try:
-        found = np.array(rows, dtype=np.float64)
+        samples = np.array(rows, dtype=np.float64)
     except (TypeError, ValueError, OverflowError):
-        found = np.zeros(1)
-    if found.size == 0:
+        samples = np.zeros(1)
+    if samples.size == 0:
         return np.empty((0, 4))
-    good = found.ndim == 2 and found.shape[1] == len(FIELDS) and np.isfinite(found).all()
-    if not good or (np.diff(found[:, 0]) <= 0).any() or not 0 <= found[0, 0] <= found[-1, 0] < 1e9:
+    good = samples.ndim == 2 and samples.shape[1] == len(FIELDS) and np.isfinite(samples).all()
+    if not good or (np.diff(samples[:, 0]) <= 0).any() or not 0 <= samples[0, 0] <= samples[-1, 0] < 1e9:
         raise SourceError(
             "value-invalid",
             f"a message of the accelerometer has no rows of {', '.join(FIELDS)} in order",
             "check the version of Klipper",
             key="data",
         )
-    return found
+    return samples

@@ -77,12 +77,12 @@ class InFlight:
 
     def settled(self, delivery: int, now_s: float) -> list[int]:
         """Messages to acknowledge, since the deliveries up to this one are settled."""
-        found = []
+        batches = []
         while self._messages and self._messages[0][1] <= delivery:
-            found.append(self._messages.popleft()[0])
-        if found and self._asked is not None and self._asked[1] == inf:
+            batches.append(self._messages.popleft()[0])
+        if batches and self._asked is not None and self._asked[1] == inf:
             self._asked = self._asked[0], now_s
-        return found
+        return batches
 
     def waits(self, now_s: float) -> bool:
         """Whether the broker seems to wait for acknowledgements."""

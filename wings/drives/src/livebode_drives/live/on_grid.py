@@ -80,14 +80,14 @@ class OnGrid:
         return [(first, _through_six(data, before - (SIDE - 1), place - before + (SIDE - 1)))]
 
 
-def _through_six(data: Floats, first: NDArray[np.int64], at: Floats) -> Floats:
+def _through_six(data: Floats, first: NDArray[np.int64], position: Floats) -> Floats:
     """Values of the polynomial (Lagrange) through six samples from `first` on, `at` steps after the first of them."""
-    found = np.zeros((len(data), at.size))
+    interpolated = np.zeros((len(data), position.size))
     nodes = range(2 * SIDE)
     for node in nodes:
-        weight = np.ones(at.size)
+        weight = np.ones(position.size)
         for other in nodes:
             if other != node:
-                weight *= (at - other) / (node - other)
-        found += weight * data[:, first + node]
-    return found
+                weight *= (position - other) / (node - other)
+        interpolated += weight * data[:, first + node]
+    return interpolated

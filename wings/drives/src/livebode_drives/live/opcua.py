@@ -61,9 +61,9 @@ class StampCollector:
                 key="SourceTimestamp",
                 node=key,
             )
-        found = whole(value) if key == self._sample_node else numbers(value)
+        number = whole(value) if key == self._sample_node else numbers(value)
         moment = self._moments.setdefault(stamp, {})
-        moment[key] = found
+        moment[key] = number
         if moment.keys() != self._required:
             while len(self._moments) > INCOMPLETE_MAX:
                 self._moments.popitem(last=False)

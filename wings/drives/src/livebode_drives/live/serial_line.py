@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
+import math
 import os
+import re
 import time
 from pathlib import Path
 from types import ModuleType
 from typing import ClassVar, Protocol
 
-from livebode.core import ConfigError, LivebodeError, not_installed
+import numpy as np
+from numpy.typing import NDArray
+
+from livebode.core import Channel, ConfigError, LivebodeError, SourceError, not_installed
 from livebode.sources.live import (
     LINE_BYTES_MAX,
     MAGIC,
     TICK_S,
     Address,
     AnyBatch,
+    Batch,
     FrameDecoder,
     FrameSplitter,
     LineDecoder,
@@ -25,8 +31,108 @@ from livebode.sources.live import (
     named_channels,
 )
 from livebode_drives.live.arrival_rate import ArrivalRate
-from livebode_drives.live.number_lines import NumberLines
+from livebode_drives.live.counter import Counter, NumberedSample, batches_of
 from livebode_drives.source_settings import DriveKeys
+
+_BETWEEN = re.compile(rb"[,;\s]+")
+_SHOWN = 40
+
+
+def numbers_in(line: bytes, width: int) -> NDArray[np.float64]:
+    """The numbers in a line, separated by commas, semicolons, spaces or tabs.
+
+    Raises
+    ------
+    SourceError
+        Where the line has another number of fields, or one that is not a number.
+
+    Examples
+    --------
+    >>> numbers_in(b"17, -0.5;1e3", 3).tolist()
+    [17.0, -0.5, 1000.0]
+    """
+    fields = _BETWEEN.split(line.strip())
+    if len(fields) != width:
+        raise line_not_numbers(line, f"has {len(fields)} fields, not {width}")
+    if b"_" in line:  # a digit separator in Python only
+        raise line_not_numbers(line, "is not of numbers")
+    try:
+        return np.array([float(field) for field in fields])
+    except ValueError:
+        raise line_not_numbers(line, "is not of numbers") from None
+
+
+def line_not_numbers(line: bytes, wrong: str) -> SourceError:
+    shown = ascii(line[:_SHOWN].decode("latin-1"))
+    return SourceError(
+        "line-not-numbers",
+        f"the line {shown} {wrong}",
+        "send a number for each of source.channels in each line, and check source.baud_rate",
+        line=shown,
+    )
+
+
+class NumberLines:
+    """Turns lines of numbers into Batches.
+
+    Without a counter each line is the next sample, also one that cannot be read: its sample is missing.
+
+    Parameters
+    ----------
+    channels, rate_hz
+        Of the stream.
+    counter
+        Number of the column that counts the samples; None without one.
+    modulus
+        Number of values of the counter; None if it does not wrap.
+    epoch
+        Of the first sample.
+    """
+
+    def __init__(
+        self, channels: tuple[Channel, ...], rate_hz: float, counter: int | None, modulus: int | None, epoch: int
+    ) -> None:
+        self._channels, self._rate_hz, self._column = channels, rate_hz, counter
+        self._counter = Counter(rate_hz, modulus, epoch)
+        self._epoch, self._next = epoch, 0
+        self.problems: list[object] = []
+        """What was wrong with lines since this was cleared."""
+
+    @property
+    def epoch(self) -> int:
+        """Epoch of the newest sample."""
+        return self._epoch
+
+    def restart(self) -> None:
+        """The connection was lost: what is missing is known only to a counter."""
+        if self._column is None:
+            self._epoch, self._next = self._epoch + 1, 0
+
+    def batches(self, lines: list[bytes], time_s: float) -> list[Batch]:
+        """Batches of the samples in these lines, which arrived at `time_s`."""
+        samples: list[NumberedSample] = []
+        for line in lines:
+            try:
+                samples += self._sample(line, time_s)
+            except SourceError as error:
+                self.problems.append(error)
+        if self._counter.damaged:
+            self.problems.append(f"{self._counter.damaged} samples had a counter that no other sample confirmed")
+            self._counter.damaged = 0
+        if samples:
+            self._epoch = samples[-1].epoch
+        return batches_of(samples, self._channels, self._rate_hz, time_s)
+
+    def _sample(self, line: bytes, time_s: float) -> list[NumberedSample]:
+        self._next += 1
+        row = numbers_in(line, len(self._channels))
+        if self._column is None:
+            return [NumberedSample(self._epoch, self._next - 1, row)]
+        count = row[self._column]
+        if not (math.isfinite(count) and count == math.floor(count) and 0 <= count < 1 << 53):
+            raise line_not_numbers(line, f"has the counter {count:g}, which is not a whole number")
+        return self._counter.process(int(count), time_s, row)
+
 
 UNKNOWN_BYTES = 1 << 12
 """Bytes without a frame or JSON that are searched, and reported together."""
@@ -86,7 +192,7 @@ class FramesOrJson:
                 )
                 self._start = self._start[1 - len(MAGIC) :]
             return b""
-        first = min(at for at in (frame, line) if at >= 0)
+        first = min(index for index in (frame, line) if index >= 0)
         if first == frame:
             self._decoder = FramesDecoder(self.problems)
         else:
@@ -100,18 +206,18 @@ class FramesDecoder:
         self.problems = problems
 
     def feed(self, piece: bytes, time_s: float) -> list[AnyBatch]:
-        found = []
+        batches = []
         for frame in self._splitter.feed(piece):
             try:
                 batch = self._decoder.decode(frame, time_s)
             except LivebodeError as error:
                 self.problems.append(error)
                 continue
-            found += [] if batch is None else [batch]
+            batches += [] if batch is None else [batch]
         if self._splitter.skipped > self._skipped:
             self.problems.append(f"{self._splitter.skipped - self._skipped} bytes do not belong to a frame")
             self._skipped = self._splitter.skipped
-        return found
+        return batches
 
 
 class JsonDecoder:
@@ -120,14 +226,14 @@ class JsonDecoder:
         self.problems = problems
 
     def feed(self, piece: bytes, time_s: float) -> list[AnyBatch]:
-        found: list[AnyBatch] = []
+        batches: list[AnyBatch] = []
         for line in self._splitter.feed(piece):
             try:
-                found.append(self._decoder.decode(line, time_s))
+                batches.append(self._decoder.decode(line, time_s))
             except LivebodeError as error:
                 self.problems.append(error)
         report_cut(self._splitter, self.problems)
-        return found
+        return batches
 
 
 def report_cut(splitter: LineSplitter, problems: list[object]) -> None:
@@ -168,8 +274,10 @@ class SerialSource(LiveSource):
         if os.name != "nt" and not path.exists():
             from serial.tools.list_ports import comports
 
-            found = [port.device for port in comports()]
-            remedy = f"plug the device in, or set source.url to {' or '.join(found)}" if found else "plug the device in"
+            devices = [port.device for port in comports()]
+            remedy = (
+                f"plug the device in, or set source.url to {' or '.join(devices)}" if devices else "plug the device in"
+            )
             return Reach("failed", f"{self.address}: there is no such device", remedy, facts)
         if os.name != "nt" and not os.access(path, os.R_OK | os.W_OK):
             remedy = f"add the user to the group of {path}, often dialout, and log in again"
@@ -184,7 +292,7 @@ class SerialSource(LiveSource):
             try:
                 while not self._stop.is_set():
                     if piece := port.read(1):
-                        self._take_piece(decoder, piece + port.read(min(port.in_waiting, PIECE_BYTES)))
+                        self._process_piece(decoder, piece + port.read(min(port.in_waiting, PIECE_BYTES)))
                         self._stop.wait(TOGETHER_S)
             finally:
                 if self._lines is not None:
@@ -194,7 +302,7 @@ class SerialSource(LiveSource):
     def _decoder(self) -> SerialDecoder:
         return FramesOrJson(self.settings.rate_hz) if self._lines is None else NumbersDecoder(self._lines)
 
-    def _take_piece(self, decoder: SerialDecoder, piece: bytes) -> None:
+    def _process_piece(self, decoder: SerialDecoder, piece: bytes) -> None:
         now = time.monotonic()
         for batch in decoder.feed(piece, now):
             self._check_rate(batch, now)

@@ -45,9 +45,9 @@ class Programme:
         """Number of samples; None before `stop`."""
         return None if self._stop is None else self._stop + self._down
 
-    def stop(self, at: int) -> int:
+    def stop(self, sample: int) -> int:
         """Begin the ramp down with sample `at`; only the first request counts. Returns the length."""
-        self._stop = at if self._stop is None else self._stop
+        self._stop = sample if self._stop is None else self._stop
         return self._stop + self._down
 
     def samples(self, first: int, last: int) -> NDArray[np.float64]:
@@ -99,10 +99,10 @@ class HalPlayer(Player):
         return f"{self._streamer} plays {self._excitation!r}; {self._guard.mux} makes it zero when it is empty"
 
     def _check_streamer(self) -> None:
-        found = fifo(STREAMER_KEY + self._section.streamer)
-        if found is None:
+        ring = fifo(STREAMER_KEY + self._section.streamer)
+        if ring is None:
             raise self._wrong(f"no {self._streamer} is loaded", "load it, as in wings/drives/docs/linuxcnc.md")
-        if found.users > 1:
+        if ring.users > 1:
             raise self._wrong(f"another program plays through {self._streamer}", "end the other halstreamer")
         if pin_value(f"{self._streamer}.empty") != "TRUE" or pin_value(f"{self._streamer}.enable") != "TRUE":
             raise self._wrong(
@@ -111,10 +111,10 @@ class HalPlayer(Player):
 
     def _found_guard(self) -> StreamerGuard:
         """The mux2 that makes the excitation zero; a streamer without one would hold its last value."""
-        found = links()
-        by_writer = {link.writer: link for link in found.values()}
+        wiring = links()
+        by_writer = {link.writer: link for link in wiring.values()}
         empty, played = by_writer.get(f"{self._streamer}.empty"), by_writer.get(f"{self._streamer}.pin.0")
-        driver = found.get(self._excitation)
+        driver = wiring.get(self._excitation)
         if empty is not None and played is not None and driver is not None:
             mux = driver.writer.removesuffix(".out")
             guarded = f"{mux}.sel" in empty.readers and f"{mux}.in0" in played.readers

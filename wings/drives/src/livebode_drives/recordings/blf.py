@@ -32,55 +32,61 @@ def check(file: IO[bytes], size: int) -> None:
     size
         Its length in bytes.
     """
-    _, at = FILE_HEAD.unpack(file.read(FILE_HEAD.size).ljust(FILE_HEAD.size, b"\0"))
-    if not 144 <= at <= size:
-        raise damaged(f"its header declares {at} bytes of {size}", size=at)
-    rest = b""
-    while at < size:
-        file.seek(at)
+    _, position = FILE_HEAD.unpack(file.read(FILE_HEAD.size).ljust(FILE_HEAD.size, b"\0"))
+    if not 144 <= position <= size:
+        raise damaged(f"its header declares {position} bytes of {size}", size=position)
+    remainder = b""
+    while position < size:
+        file.seek(position)
         signature, _, _, length, kind = OBJECT_HEAD.unpack(file.read(OBJECT_HEAD.size).ljust(OBJECT_HEAD.size, b"\0"))
         if signature != b"LOBJ" or length < OBJECT_HEAD.size:
-            raise damaged(f"there is no object at byte {at}", byte=at)
-        if at + length > size:
-            raise truncated(f"the object at byte {at} ends {at + length - size} bytes early", byte=at)
+            raise damaged(f"there is no object at byte {position}", byte=position)
+        if position + length > size:
+            raise truncated(f"the object at byte {position} ends {position + length - size} bytes early", byte=position)
         if kind == CONTAINER:
-            rest = after_objects(rest + content_of(file, at, length), at)
-        at += length + length % 4
-    if rest.strip(b"\0"):
-        raise truncated(f"its last object ends {len(rest)} bytes after its beginning")
+            remainder = after_objects(remainder + content_of(file, position, length), position)
+        position += length + length % 4
+    if remainder.strip(b"\0"):
+        raise truncated(f"its last object ends {len(remainder)} bytes after its beginning")
 
 
-def content_of(file: IO[bytes], at: int, length: int) -> bytes:
+def content_of(file: IO[bytes], position: int, length: int) -> bytes:
     """The bytes of a container at `at`, at most as many as it declares."""
     if not OBJECT_HEAD.size + CONTAINER_HEAD.size <= length <= CONTAINER_BYTES_MAX:
-        raise oversized(f"the container at byte {at} has {length} bytes", CONTAINER_BYTES_MAX, byte=at)
+        raise oversized(f"the container at byte {position} has {length} bytes", CONTAINER_BYTES_MAX, byte=position)
     raw = file.read(length - OBJECT_HEAD.size)
     method, declared = CONTAINER_HEAD.unpack_from(raw)
     if method != 2:
         return raw[CONTAINER_HEAD.size :] if method == 0 else b""
     if declared > CONTAINER_BYTES_MAX:
-        raise oversized(f"the container at byte {at} declares {declared} bytes", CONTAINER_BYTES_MAX, byte=at)
+        raise oversized(
+            f"the container at byte {position} declares {declared} bytes", CONTAINER_BYTES_MAX, byte=position
+        )
     content = zlib.decompressobj().decompress(raw[CONTAINER_HEAD.size :], declared + 1)
     if len(content) != declared:
-        raise damaged(f"the container at byte {at} does not have the {declared} bytes that it declares", byte=at)
+        raise damaged(
+            f"the container at byte {position} does not have the {declared} bytes that it declares", byte=position
+        )
     return content
 
 
-def after_objects(data: bytes, at: int) -> bytes:
+def after_objects(data: bytes, position: int) -> bytes:
     """The object at the end of the container at byte `at` that continues in the next container, or nothing."""
     here = 0
     while True:
-        found = data.find(b"LOBJ", here, here + 8)
-        if found < 0 and here + 8 <= len(data):
-            raise damaged(f"the container at byte {at} has no object at its byte {here}", byte=at)
-        if found < 0 or found + OBJECT_HEAD.size > len(data):
+        start = data.find(b"LOBJ", here, here + 8)
+        if start < 0 and here + 8 <= len(data):
+            raise damaged(f"the container at byte {position} has no object at its byte {here}", byte=position)
+        if start < 0 or start + OBJECT_HEAD.size > len(data):
             return data[here:]
-        _, head, _, length, _ = OBJECT_HEAD.unpack_from(data, found)
+        _, head, _, length, _ = OBJECT_HEAD.unpack_from(data, start)
         if not OBJECT_HEAD.size < head <= length <= OBJECT_BYTES_MAX:
-            raise damaged(f"the container at byte {at} has an object of {length} bytes", byte=at, size=length)
-        if found + length > len(data):
+            raise damaged(
+                f"the container at byte {position} has an object of {length} bytes", byte=position, size=length
+            )
+        if start + length > len(data):
             return data[here:]
-        here = found + length
+        here = start + length
 
 
 class BlfRecording(VectorRecording):

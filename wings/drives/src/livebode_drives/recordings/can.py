@@ -58,8 +58,8 @@ class CanRecording(Recording):
         identity, message, _ = columns[0].key
         signals = [column.key[2] for column in columns]
         held: list[list[float]] = []
-        for found, time_s, data in self._frames():
-            if found != identity:
+        for frame_identity, time_s, data in self._frames():
+            if frame_identity != identity:
                 continue
             if len(data) < message.length:
                 raise damaged(

@@ -13,7 +13,7 @@ import numpy as np
 
 from livebode.core import RecordingError
 from livebode.sources import COLUMNS_MAX, Chunk, Column, Recording, Skipped, damaged, oversized
-from livebode_drives.recordings.timed import TimedColumns, as_columns
+from livebode_drives.recordings.timed_columns import TimedColumns, as_columns
 from livebode_drives.recordings.twincatwords import unique_names
 
 VARIABLE = re.compile(rb"(\d+)\.Variable;(.*)")
@@ -89,10 +89,10 @@ def read_sections(file: IO[bytes]) -> tuple[str, list[TracedVariable]]:
     sections: list[TracedVariable] = []
     while line := file.readline(LINE_BYTES_MAX):
         number += 1
-        if found := FLAGS.match(line):
-            unit = "us" if int(found[1]) & (IN_MS | IN_US) == IN_US else "ms"
-        elif found := VARIABLE.match(line):
-            name = found[2].decode("utf-8", "replace").strip()
+        if match := FLAGS.match(line):
+            unit = "us" if int(match[1]) & (IN_MS | IN_US) == IN_US else "ms"
+        elif match := VARIABLE.match(line):
+            name = match[2].decode("utf-8", "replace").strip()
         elif DATA.match(line):
             section = read_section(file, name, number + 1)
             number += section.samples
@@ -104,7 +104,7 @@ def read_sections(file: IO[bytes]) -> tuple[str, list[TracedVariable]]:
 
 def read_section(file: IO[bytes], name: str, number: int) -> TracedVariable:
     """The samples from here to the first line that is not one, which remains to be read."""
-    at = end = file.tell()
+    start = end = file.tell()
     samples, digest, is_text = 0, hashlib.blake2b(), False
     while (line := file.readline(LINE_BYTES_MAX)).startswith(b";"):
         cells = line.split(b";", 2)
@@ -113,7 +113,7 @@ def read_section(file: IO[bytes], name: str, number: int) -> TracedVariable:
         samples += 1
         end = file.tell()
     file.seek(end)
-    return TracedVariable(name, at, number, samples, digest.digest(), is_text)
+    return TracedVariable(name, start, number, samples, digest.digest(), is_text)
 
 
 def row_of(file: IO[bytes], number: int) -> tuple[float, float]:

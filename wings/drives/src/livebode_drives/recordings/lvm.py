@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import ClassVar
 
 from livebode.sources import Chunk, Column, DelimitedRecording, Dialect, Sample, exact_rate_hz, is_number
-from livebode_drives.recordings.timed import TimedColumns, as_columns, merged, trimmed
+from livebode_drives.recordings.timed_columns import TimedColumns, as_columns, merged, trimmed
 
 TIME = "X_Value"
 COMMENT = "Comment"
@@ -26,7 +26,7 @@ class LvmRecording(DelimitedRecording):
         columns = self._named()
         if self._tag("X_Columns", "One").casefold() == "no":
             self.columns, self.skipped = tuple(column for column in columns if column.name != TIME), ()
-            self._take_increment()
+            self._read_increment()
             return
         groups: list[TimedColumns] = []
         for column in columns:
@@ -41,7 +41,9 @@ class LvmRecording(DelimitedRecording):
     def find_dialect(self, path: Path) -> Dialect:
         """The dialect as the tags of the file define it."""
         sample = Sample.of(path)
-        start = next((at for at, line in enumerate(sample.lines) if line.text.startswith(TIME)), len(sample.lines))
+        start = next(
+            (index for index, line in enumerate(sample.lines) if line.text.startswith(TIME)), len(sample.lines)
+        )
         if start + 1 >= len(sample.lines):
             raise sample.without_table()
         separator = "," if any(line.text.startswith("Separator,") for line in sample.lines[:start]) else "\t"
@@ -61,12 +63,12 @@ class LvmRecording(DelimitedRecording):
         units = self._tags.get("Y_Unit_Label", [])
         horizontal = {"time": "s"}.get(self._tag("X_Dimension", "Time").casefold(), "")
         return [
-            Column(name, horizontal if name == TIME else units[at] if at < len(units) else "", key=at)
-            for at, name in enumerate(self._dialect.headings)
+            Column(name, horizontal if name == TIME else units[index] if index < len(units) else "", key=index)
+            for index, name in enumerate(self._dialect.headings)
             if name not in ("", COMMENT)
         ]
 
-    def _take_increment(self) -> None:
+    def _read_increment(self) -> None:
         increment = self._tag("Delta_X", "").replace(",", ".")
         if is_number(increment) and 0 < float(increment) < float("inf"):
             self.rate_hz = exact_rate_hz(float(increment), 0.0)

@@ -39,8 +39,8 @@ class McapRecording(RosRecording):
                         raise damaged(f"a message belongs to channel {number}, which is not defined", part=number)
                     yield topics[number], time_ns, record[22:]
                 elif kind == SCHEMA:
-                    number, rest = int.from_bytes(record[:2], "little"), record[2:]
-                    schemas[number] = texts(rest)
+                    number, fields = int.from_bytes(record[:2], "little"), record[2:]
+                    schemas[number] = texts(fields)
                 else:
                     number, schema = struct.unpack_from("<HH", record)
                     topics[number] = topic_of(texts(record[4:])[:2], schemas.get(schema, ("", "", "")))
@@ -56,14 +56,14 @@ def topic_of(channel: tuple[str, ...], schema: tuple[str, str, str]) -> Topic:
 
 def texts(raw: bytes) -> tuple[str, str, str]:
     """Three texts, each behind its length."""
-    found, at = [], 0
+    words, position = [], 0
     for _ in range(3):
-        length = int.from_bytes(raw[at : at + 4], "little")
-        at += 4 + length
-        if at > len(raw):
+        length = int.from_bytes(raw[position : position + 4], "little")
+        position += 4 + length
+        if position > len(raw):
             raise damaged(f"a text of {length} bytes exceeds its record")
-        found.append(raw[at - length : at].decode("utf-8", "replace"))
-    return found[0], found[1], found[2]
+        words.append(raw[position - length : position].decode("utf-8", "replace"))
+    return words[0], words[1], words[2]
 
 
 def flat_records(file: IO[bytes], size: int) -> Iterator[tuple[int, bytes]]:
@@ -85,22 +85,22 @@ def flat_records(file: IO[bytes], size: int) -> Iterator[tuple[int, bytes]]:
 
 def records(file: IO[bytes], end: int) -> Iterator[tuple[int, bytes]]:
     """Kind and content of the records that are read, from here to `end` or to the end of the data."""
-    at = file.tell()
-    while at < end:
+    start = file.tell()
+    while start < end:
         head = file.read(RECORD.size)
         if len(head) < RECORD.size:
-            raise truncated(f"the record at byte {at} ends early", byte=at)
+            raise truncated(f"the record at byte {start} ends early", byte=start)
         kind, length = RECORD.unpack(head)
-        if at + RECORD.size + length > end:
-            raise truncated(f"the record at byte {at} declares {length} bytes, more than there are", byte=at)
+        if start + RECORD.size + length > end:
+            raise truncated(f"the record at byte {start} declares {length} bytes, more than there are", byte=start)
         if kind == FOOTER:
             return
         if kind in READ:
             if length > RECORD_BYTES_MAX:
-                raise oversized(f"the record at byte {at} has {length} bytes", RECORD_BYTES_MAX, byte=at)
+                raise oversized(f"the record at byte {start} has {length} bytes", RECORD_BYTES_MAX, byte=start)
             yield kind, file.read(length)
-        at += RECORD.size + length
-        file.seek(at)
+        start += RECORD.size + length
+        file.seek(start)
 
 
 def expanded(chunk: bytes) -> bytes:

@@ -1,19 +1,68 @@
-"""MDF 4 and 3, the file of measurement systems in vehicles: channel groups, and CAN frames, streamed by asammdf."""
+"""MDF 4 and 3, the file of measurement systems in vehicles: channel groups, and CAN frames, streamed by asammdf.
+
+asammdf is opened without its messages and without what it leaves behind after an error.
+"""
 
 from __future__ import annotations
 
 import heapq
+import logging
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
 
-from livebode.sources import COLUMNS_MAX, Chunk, Column, Recording, Skipped, damaged, no_frames, oversized, truncated
+from livebode.sources import (
+    COLUMNS_MAX,
+    Chunk,
+    Column,
+    Recording,
+    Skipped,
+    damaged,
+    missing,
+    no_frames,
+    oversized,
+    truncated,
+)
 from livebode_drives.recordings.can import CanRecording, Identity
-from livebode_drives.recordings.mdffile import opened
+from livebode_drives.recordings.silence import silence
+
+
+@contextmanager
+def opened(path: Path) -> Iterator[Any]:
+    try:
+        from asammdf import MDF, mdf
+        from asammdf.blocks import mdf_v3, mdf_v4, v4_blocks
+    except ImportError:
+        raise missing(path, "asammdf", "mdf") from None
+    silence(mdf, mdf_v3, mdf_v4, v4_blocks)
+    logging.getLogger("asammdf").setLevel(logging.CRITICAL)  # its messages are in the error that follows
+    with path.open("rb") as raw:  # a path would be mapped; if a mapped file shrinks, the process is killed
+        try:
+            file = MDF(raw)
+        except Exception as error:
+            abandon(error)
+            raise
+        try:
+            yield file
+        finally:
+            file.close()
+
+
+def abandon(error: Exception) -> None:
+    """Close the incomplete object of asammdf, which would print on standard error when it is collected."""
+    trace = error.__traceback__
+    while trace is not None:
+        half: Any = trace.tb_frame.f_locals.get("self")
+        if hasattr(half, "_tempfile") and not getattr(half, "_closed", True):
+            half._closed = True
+            half._tempfile.close()
+        trace = trace.tb_next
+
 
 FRAME = "CAN_DataFrame"
 ROWS = 1000
@@ -28,8 +77,8 @@ class MdfCanRecording(CanRecording):
     def _frames(self) -> Iterator[tuple[Identity, float, bytes]]:
         with opened(self.path) as file:
             groups = [
-                group_frames(file, at, int(group.channel_group.cycles_nr))
-                for at, group in enumerate(file.groups)
+                group_frames(file, number, int(group.channel_group.cycles_nr))
+                for number, group in enumerate(file.groups)
                 if any(channel.name == FRAME for channel in group.channels)
             ]
             yield from heapq.merge(*groups, key=lambda frame: frame[1])
@@ -38,17 +87,17 @@ class MdfCanRecording(CanRecording):
 def group_frames(file: Any, group: int, samples: int) -> Iterator[tuple[Identity, float, bytes]]:
     for first in range(0, samples, ROWS):
         count = min(ROWS, samples - first)
-        found = file.get(FRAME, group, record_offset=first, record_count=count, ignore_invalidation_bits=True)
-        if len(found.samples) != count:
+        frames = file.get(FRAME, group, record_offset=first, record_count=count, ignore_invalidation_bits=True)
+        if len(frames.samples) != count:
             raise truncated(f"group {group} ends before its {samples} frames", samples=samples)
-        fields = {name.rpartition(".")[2]: found.samples[name] for name in found.samples.dtype.names}
+        fields = {name.rpartition(".")[2]: frames.samples[name] for name in frames.samples.dtype.names}
         numbers = np.asarray(fields["ID"], dtype=np.int64)
         extended = np.asarray(fields.get("IDE", 0), dtype=bool) | (numbers & EXTENDED > 0)
         buses = np.broadcast_to(fields.get("BusChannel", np.int64(1)), count)
         lengths = np.asarray(fields.get("DataLength", fields.get("DLC")), dtype=np.int64)
         for row in range(count):
             identity = int(buses[row]), int(numbers[row]) & 0x1FFFFFFF, bool(extended[row])
-            yield identity, float(found.timestamps[row]), fields["DataBytes"][row][: lengths[row]].tobytes()
+            yield identity, float(frames.timestamps[row]), fields["DataBytes"][row][: lengths[row]].tobytes()
 
 
 TIME_MASTER = 1
@@ -72,25 +121,27 @@ class MdfRecording(Recording):
         skipped: list[Skipped] = []
         clocks: dict[int, bytes] = {}
         with opened(path) as file:
-            for at, group in enumerate(file.groups):
+            for number, group in enumerate(file.groups):
                 if len(columns) + len(group.channels) > COLUMNS_MAX:
                     raise oversized(f"{path} has more than {COLUMNS_MAX} channels", COLUMNS_MAX, path=str(path))
                 samples = int(group.channel_group.cycles_nr)
-                self._check_size(file, at, samples)
+                self._check_size(file, number, samples)
                 for channel in group.channels:
                     self._check_place(channel, int(group.channel_group.samples_byte_nr))
                 if any(channel.name in FRAMES for channel in group.channels):
                     self.has_frames = True
-                    skipped.append(Skipped(f"group {at}", "it has CAN frames, whose signals only a DBC file defines"))
+                    skipped.append(
+                        Skipped(f"group {number}", "it has CAN frames, whose signals only a DBC file defines")
+                    )
                     continue
                 for index, channel in enumerate(group.channels):
-                    column = Column(channel.name, unit_of(channel), samples, key=(at, index))
-                    first = file.get(group=at, index=index, record_count=1, ignore_invalidation_bits=True)
+                    column = Column(channel.name, unit_of(channel), samples, key=(number, index))
+                    first = file.get(group=number, index=index, record_count=1, ignore_invalidation_bits=True)
                     if first.samples.ndim == 1 and first.samples.dtype.kind in "fiub":
                         columns.append(replace(column, unit=str(first.unit or column.unit)))
                     else:
                         skipped.append(Skipped(channel.name, "its values are not single numbers"))
-                clocks[at] = clock_of(file, at, samples)
+                clocks[number] = clock_of(file, number, samples)
         count = Counter(column.name for column in columns)
         named = [
             replace(column, name=f"{column.key[0]}/{column.name}") if count[column.name] > 1 else column
@@ -98,9 +149,9 @@ class MdfRecording(Recording):
         ]
         self.columns, self.skipped = grouped(named, clocks), tuple(skipped)
 
-    def _check_size(self, file: Any, at: int, samples: int) -> None:
+    def _check_size(self, file: Any, number: int, samples: int) -> None:
         """RecordingError if a group declares more than the file can contain, even compressed by 1000."""
-        width = int(file.groups[at].channel_group.samples_byte_nr)
+        width = int(file.groups[number].channel_group.samples_byte_nr)
         if samples * max(width, 1) > 1000 * self.path.stat().st_size:
             raise truncated(
                 f"{self.path} declares {samples} samples of {width} bytes, more than its size allows",
@@ -127,7 +178,7 @@ class MdfRecording(Recording):
             for first in range(0, samples, rows):
                 count = min(rows, samples - first)
                 chunk = [self._values(file, column, first, count) for column in columns]
-                if any(len(found) != count for found in chunk):
+                if any(len(values) != count for values in chunk):
                     raise truncated(
                         f"{self.path} ends before its {samples} samples", path=str(self.path), samples=samples
                     )
@@ -135,22 +186,22 @@ class MdfRecording(Recording):
 
     def _values(self, file: Any, column: Column, first: int, count: int) -> Any:
         group, index = column.key
-        found, invalid = file.get(
+        values, invalid = file.get(
             group=group, index=index, record_offset=first, record_count=count, samples_only=True,
             ignore_invalidation_bits=True,
         )  # fmt: skip
         if invalid is not None and np.any(invalid):
-            found = np.where(invalid, np.nan, found)
-        return found
+            values = np.where(invalid, np.nan, values)
+        return values
 
 
-def clock_of(file: Any, at: int, samples: int) -> bytes:
+def clock_of(file: Any, number: int, samples: int) -> bytes:
     """The times of a group at its beginning, middle and end; empty if it has no time."""
-    index = file.masters_db.get(at)
-    if index is None or not is_time(file.groups[at].channels[index]):
+    index = file.masters_db.get(number)
+    if index is None or not is_time(file.groups[number].channels[index]):
         return b""
     ends = [max(0, min(first, samples - _COMPARED)) for first in (0, samples // 2, samples - _COMPARED)]
-    times = [file.get_master(at, record_offset=first, record_count=_COMPARED) for first in ends]
+    times = [file.get_master(number, record_offset=first, record_count=_COMPARED) for first in ends]
     return bytes(index.to_bytes(4, "little") + samples.to_bytes(8, "little") + np.concatenate(times).tobytes())
 
 
@@ -161,17 +212,19 @@ def is_time(channel: Any) -> bool:
 
 def grouped(columns: Sequence[Column], clocks: Mapping[int, bytes]) -> tuple[Column, ...]:
     """The columns; if the file has several clocks, each group of columns is named after its time."""
-    first = {times: at for at, times in reversed(list(clocks.items())) if times}
+    first = {times: number for number, times in reversed(list(clocks.items())) if times}
     if len(first) < 2:
         return tuple(columns)
-    masters = {at: int.from_bytes(times[:4], "little") for times, at in first.items()}
+    masters = {number: int.from_bytes(times[:4], "little") for times, number in first.items()}
     names = {c.key[0]: c.name for c in columns if masters.get(c.key[0]) == c.key[1]}
-    found = []
+    columns_of_groups = []
     for column in columns:
-        at, index = column.key
-        of = first.get(clocks[at], at)
-        found.append(replace(column, group=names.get(of, ""), clock=of in names and (at, index) == (of, masters[of])))
-    return tuple(found)
+        number, index = column.key
+        of = first.get(clocks[number], number)
+        columns_of_groups.append(
+            replace(column, group=names.get(of, ""), clock=of in names and (number, index) == (of, masters[of]))
+        )
+    return tuple(columns_of_groups)
 
 
 def unit_of(channel: Any) -> str:

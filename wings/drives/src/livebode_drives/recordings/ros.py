@@ -34,8 +34,8 @@ def parts_of(path: Path) -> list[Path]:
     """
     if not path.is_dir():
         return [path]
-    parts = sorted((one for one in path.iterdir() if one.suffix in SUFFIXES and one.is_file()), key=in_order)
-    if packed := sorted(one for one in path.glob("*.zstd") if one.stem.endswith(SUFFIXES)):
+    parts = sorted((file for file in path.iterdir() if file.suffix in SUFFIXES and file.is_file()), key=in_order)
+    if packed := sorted(file for file in path.glob("*.zstd") if file.stem.endswith(SUFFIXES)):
         raise RecordingError(
             "not-a-file", f"{packed[0]} is compressed as a whole", "decompress it with zstd -d", path=str(packed[0])
         )
@@ -97,7 +97,7 @@ class RosRecording(Recording):
             last[topic] = raw
         columns: list[Column] = []
         skipped: list[Skipped] = []
-        for topic in sorted(first, key=lambda one: one.name):
+        for topic in sorted(first, key=lambda entry: entry.name):
             if why := topic.unreadable or unknown_type(topic):
                 skipped.append(Skipped(topic.name, why))
             else:
@@ -120,8 +120,8 @@ class RosRecording(Recording):
         topic = columns[0].key[0]
         decode = store_of(topic).deserialize_cdr
         held: list[list[Any]] = []
-        for found, time_ns, raw in self._messages():
-            if found != topic:
+        for message_topic, time_ns, raw in self._messages():
+            if message_topic != topic:
                 continue
             message = decode(raw, topic.type)
             held.append([value_at(message, column.key[1], time_ns) for column in columns])
@@ -166,15 +166,15 @@ def topic_columns(topic: Topic, ends: tuple[bytes, bytes], samples: int, skipped
         key, unit = (topic, path), "ns" if temporal else ""
         return Column(f"{topic.name}.{text}", unit, samples, (text,), temporal, key, topic.name, path == clock)
 
-    found = [column(path, True) for path in ((LOGGED, STAMP) if stamped else (LOGGED,))]
+    columns = [column(path, True) for path in ((LOGGED, STAMP) if stamped else (LOGGED,))]
     for path, why in numbers_in(store, topic.type, message, ()):
         if why:
             skipped.append(Skipped(f"{topic.name}.{path_text(path)}", why))
         elif path[:2] != STAMP or not stamped:
-            found.append(column(path, False))
-        if len(found) > COLUMNS_MAX:
+            columns.append(column(path, False))
+        if len(columns) > COLUMNS_MAX:
             raise oversized(f"topic {topic.name!r} has more than {COLUMNS_MAX} fields", COLUMNS_MAX)
-    return found
+    return columns
 
 
 def path_text(path: tuple[str | int, ...]) -> str:
@@ -187,7 +187,7 @@ def path_text(path: tuple[str | int, ...]) -> str:
 
 
 def numbers_in(
-    store: Any, type_: str, message: Any, at: tuple[str | int, ...]
+    store: Any, type_: str, message: Any, parent: tuple[str | int, ...]
 ) -> Iterator[tuple[tuple[str | int, ...], str]]:
     """Paths of the numbers in a message, and of what is not a number with the reason."""
     from rosbags.interfaces import Nodetype
@@ -195,18 +195,18 @@ def numbers_in(
 
     for field, (kind, detail) in store.fielddefs[type_][1]:
         name = normalize_fieldname(field)
-        path, value = (*at, name), getattr(message, name)
+        path, value = (*parent, name), getattr(message, name)
         repeated = kind in SEQUENCES
-        inner, what = detail[0] if repeated else (kind, detail)
-        if inner == Nodetype.BASE and what[0] not in NUMBERS:
-            yield path, f"it is of type {what[0]}"
+        inner, item_type = detail[0] if repeated else (kind, detail)
+        if inner == Nodetype.BASE and item_type[0] not in NUMBERS:
+            yield path, f"it is of type {item_type[0]}"
         elif repeated and len(value) > WIDTH_MAX:
             yield path, f"it has {len(value)} elements, more than {WIDTH_MAX}"
         else:
-            places = [((*path, k), one) for k, one in enumerate(value)] if repeated else [(path, value)]
-            for place, one in places:
+            places = [((*path, k), item) for k, item in enumerate(value)] if repeated else [(path, value)]
+            for place, item in places:
                 if inner == Nodetype.NAME:
-                    yield from numbers_in(store, what, one, place)
+                    yield from numbers_in(store, item_type, item, place)
                 else:
                     yield place, ""
 

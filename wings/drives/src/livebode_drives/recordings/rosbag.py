@@ -26,11 +26,11 @@ class RosbagRecording(RosRecording):
         reader.open()
         try:
             topics = {}
-            for one in reader.connections:
-                encoding = getattr(one.ext, "serialization_format", "")
+            for source in reader.connections:
+                encoding = getattr(source.ext, "serialization_format", "")
                 unreadable = "" if encoding == "cdr" else f"its messages are encoded as {encoding!r}, not cdr"
-                language = LANGUAGES.get(one.msgdef.format.name, "")
-                topics[one.id] = Topic(one.topic, one.msgtype, one.msgdef.data, language, unreadable)
+                language = LANGUAGES.get(source.msgdef.format.name, "")
+                topics[source.id] = Topic(source.topic, source.msgtype, source.msgdef.data, language, unreadable)
             for connection, time_ns, raw in reader.messages(reader.connections):
                 yield topics[connection.id], time_ns, raw
         finally:

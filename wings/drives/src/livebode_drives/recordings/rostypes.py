@@ -60,14 +60,16 @@ def unknown_type(topic: Topic) -> str:
 def check_types(types: Any, name: str) -> None:
     """RecordingError if names are not names, or if the types contain themselves or too much."""
     names = [*types, *(field for constants, fields in types.values() for field, *_ in (*constants, *fields))]
-    if wrong := [one for one in names if not NAME.fullmatch(one)]:
+    if wrong := [name for name in names if not NAME.fullmatch(name)]:
         raise damaged(f"its message types have a field {wrong[0][:40]!r}", part=name)
     if name not in types:
         raise damaged(f"message type {name!r} is not defined", part=name)
     width: dict[str, int] = {}
-    for one in types:
-        if fields_of(one, types, width, ()) > COLUMNS_MAX:
-            raise oversized(f"message type {one!r} has more than {COLUMNS_MAX} fields", COLUMNS_MAX, part=one)
+    for message_type in types:
+        if fields_of(message_type, types, width, ()) > COLUMNS_MAX:
+            raise oversized(
+                f"message type {message_type!r} has more than {COLUMNS_MAX} fields", COLUMNS_MAX, part=message_type
+            )
 
 
 def fields_of(name: str, types: Any, width: dict[str, int], within: tuple[str, ...]) -> int:
@@ -77,8 +79,8 @@ def fields_of(name: str, types: Any, width: dict[str, int], within: tuple[str, .
     if name not in width:
         count = 0
         for _, (kind, detail) in types[name][1]:
-            (inner, what), length = detail if kind in SEQUENCES else ((kind, detail), 1)
-            repeated = max(length, 1) if kind == ARRAY and (inner == 2 or what[0] == "string") else 1
-            count += repeated * (fields_of(what, types, width, (*within, name)) if inner == 2 else 1)
+            (inner, item_type), length = detail if kind in SEQUENCES else ((kind, detail), 1)
+            repeated = max(length, 1) if kind == ARRAY and (inner == 2 or item_type[0] == "string") else 1
+            count += repeated * (fields_of(item_type, types, width, (*within, name)) if inner == 2 else 1)
         width[name] = count
     return width[name]

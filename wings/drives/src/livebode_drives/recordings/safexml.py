@@ -67,12 +67,12 @@ def parse(path: Path, first: int = 0, length: int | None = None) -> Element:
         while piece := file.read(min(_PIECE_BYTES, first + size - file.tell())):
             parser.Parse(piece)
             if file.tell() - first - parser.CurrentByteIndex > TOKEN_BYTES_MAX:
-                at = parser.CurrentByteIndex
+                position = parser.CurrentByteIndex
                 raise oversized(
-                    f"{path} has a tag or comment of more than {TOKEN_BYTES_MAX} bytes at byte {at}",
+                    f"{path} has a tag or comment of more than {TOKEN_BYTES_MAX} bytes at byte {position}",
                     TOKEN_BYTES_MAX,
                     path=str(path),
-                    byte=at,
+                    byte=position,
                 )
     parser.Parse(b"", True)
     return builder.close()

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from livebode.sources import COLUMNS_MAX, Chunk, Column, Recording, Skipped, damaged, oversized, truncated
 from livebode_drives.formats import SCOPE_ENTRY, SCOPE_HEAD
 from livebode_drives.recordings.safexml import parse
-from livebode_drives.recordings.timed import TimedColumns, as_columns
+from livebode_drives.recordings.timed_columns import TimedColumns, as_columns
 from livebode_drives.recordings.twincat import QUANTITY, TIME
 from livebode_drives.recordings.twincatwords import unique_names
 
@@ -64,10 +64,11 @@ def read_table(path: Path) -> tuple[tuple[int, int], dict[int, Acquisition]]:
         table = file.read(count * SCOPE_ENTRY.size)
         if len(table) < count * SCOPE_ENTRY.size:
             raise truncated(f"the table of {count} acquisitions ends early")
-        found = {
-            handle: acquisition(file, at, at + span, offset) for at, span, handle in SCOPE_ENTRY.iter_unpack(table)
+        acquisitions = {
+            handle: acquisition(file, first, first + span, offset)
+            for first, span, handle in SCOPE_ENTRY.iter_unpack(table)
         }
-    return (offset, length), found
+    return (offset, length), acquisitions
 
 
 def acquisition(file: IO[bytes], first: int, stop: int, limit: int) -> Acquisition:
@@ -90,34 +91,34 @@ def acquisition(file: IO[bytes], first: int, stop: int, limit: int) -> Acquisiti
 
 def samples_of(path: Path, part: Acquisition, kind: np.dtype[Any]) -> Iterator[Samples]:
     """Times and values of the samples that are not after the end of the record, some at a time."""
-    at, raw, passed = part.first, b"", 0
+    position, raw, passed = part.first, b"", 0
     with path.open("rb") as file:
-        file.seek(at)
-        while at < part.stop:
+        file.seek(position)
+        while position < part.stop:
             if len(raw) - passed < PIECE.size:
-                raw, passed = raw[passed:] + file.read(min(READ_BYTES, part.stop - at)), 0
+                raw, passed = raw[passed:] + file.read(min(READ_BYTES, part.stop - position)), 0
             if len(raw) < PIECE.size:
-                raise truncated(f"the samples at byte {at} end early", byte=at)
+                raise truncated(f"the samples at byte {position} end early", byte=position)
             count = PIECE.unpack_from(raw, passed)[1]
-            layout = piece_of(count, kind, part.stop - at, at)
+            layout = piece_of(count, kind, part.stop - position, position)
             if layout.itemsize > len(raw) - passed:
                 raw, passed = raw[passed:] + file.read(max(layout.itemsize, READ_BYTES)), 0
             if layout.itemsize > len(raw):
-                raise truncated(f"the samples at byte {at} end early", byte=at)
-            whole = min(len(raw) - passed, part.stop - at) // layout.itemsize
+                raise truncated(f"the samples at byte {position} end early", byte=position)
+            whole = min(len(raw) - passed, part.stop - position) // layout.itemsize
             pieces = np.frombuffer(raw, layout, whole, passed)
             other = np.flatnonzero(pieces["count"] != count)
             pieces = pieces[: other[0]] if other.size else pieces
-            at += pieces.nbytes
+            position += pieces.nbytes
             passed += pieces.nbytes
             yield within(pieces, part.end)
 
 
-def piece_of(count: int, kind: np.dtype[Any], most: int, at: int) -> np.dtype[Any]:
+def piece_of(count: int, kind: np.dtype[Any], most: int, position: int) -> np.dtype[Any]:
     """Layout of a piece of `count` samples, which is within `most` bytes."""
     width = 4 + kind.itemsize
     if not 0 < count <= most // width + 1 or PIECE.size + count * width - 4 > most:
-        raise damaged(f"the piece at byte {at} declares {count} samples", byte=at)
+        raise damaged(f"the piece at byte {position} declares {count} samples", byte=position)
     later = np.dtype([("after", "<u4"), ("value", kind)])
     return np.dtype([("start", "<u8"), ("count", "<u8"), ("first", kind), ("later", later, (count - 1,))])
 
@@ -163,17 +164,17 @@ class ScopeProjectRecording(Recording):
         (first, length), self._parts = read_table(path)
         root = parse(path, first, length)
         self._kinds: dict[int, np.dtype[Any]] = {}
-        found: list[Column] = []
+        columns: list[Column] = []
         skipped: list[Skipped] = []
         shown = list(shown_acquisitions(root))
         for item in (*shown, *hidden_acquisitions(root, shown)):
-            if len(found) > COLUMNS_MAX:
+            if len(columns) > COLUMNS_MAX:
                 raise oversized(f"{path} has more than {COLUMNS_MAX} channels", COLUMNS_MAX)
             if why := self._unreadable(item):
                 skipped.append(Skipped(item.name, why))
             else:
-                found.append(item.column())
-        self.columns, self.skipped = tuple(as_columns(self._by_clock(distinct(found)))), tuple(skipped)
+                columns.append(item.column())
+        self.columns, self.skipped = tuple(as_columns(self._by_clock(distinct(columns)))), tuple(skipped)
 
     def _unreadable(self, item: ChannelDisplay) -> str:
         """Why the data of an acquisition is not read; empty if it is."""
@@ -272,13 +273,13 @@ def text(element: Element | None, path: str) -> str:
 
 
 def number(element: Element | None, path: str, default: float) -> float:
-    found = text(element, path)
-    return float(found) if found else default
+    content = text(element, path)
+    return float(content) if content else default
 
 
 def shown_acquisitions(root: Element) -> Iterator[ChannelDisplay]:
     """What the charts show; the x of an XY chart as NAME.X."""
-    by_guid = {text(one, "Guid"): one for one in root.iter() if one.find("FileHandle") is not None}
+    by_guid = {text(node, "Guid"): node for node in root.iter() if node.find("FileHandle") is not None}
     for channel in root.iter("Channel"):
         for own in channel.iter("AcquisitionInterpreter"):
             data = by_guid.get(text(own, "AcquisitionGUID"))
@@ -288,10 +289,10 @@ def shown_acquisitions(root: Element) -> Iterator[ChannelDisplay]:
 
 
 def hidden_acquisitions(root: Element, shown: Sequence[ChannelDisplay]) -> Iterator[ChannelDisplay]:
-    known = {id(one.acquisition) for one in shown}
-    for one in root.iter():
-        if one.find("FileHandle") is not None and id(one) not in known:
-            yield ChannelDisplay(text(one, "Name"), one)
+    known = {id(channel.acquisition) for channel in shown}
+    for node in root.iter():
+        if node.find("FileHandle") is not None and id(node) not in known:
+            yield ChannelDisplay(text(node, "Name"), node)
 
 
 def distinct(columns: Sequence[Column]) -> list[Column]:

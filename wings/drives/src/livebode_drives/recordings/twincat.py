@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import ClassVar
 
 from livebode.sources import Chunk, Column, DelimitedRecording, Dialect, Sample, is_number
-from livebode_drives.recordings.timed import TimedColumns, as_columns, merged, trimmed
+from livebode_drives.recordings.timed_columns import TimedColumns, as_columns, merged, trimmed
 from livebode_drives.recordings.twincatwords import properties_of_words, unique_names
 
 ROW = re.compile(r'[\s"]*[-+.\d]')
@@ -34,7 +34,7 @@ class TwinCatRecording(DelimitedRecording):
     def find_dialect(self, path: Path) -> Dialect:
         """The dialect as the export defines it: the delimiter behind "Name", one column for each cell of that row."""
         sample = Sample.of(path)
-        start = next((at for at, line in enumerate(sample.lines) if ROW.match(line.text)), None)
+        start = next((index for index, line in enumerate(sample.lines) if ROW.match(line.text)), None)
         mark = sample.text[4]
         plain = Dialect("\t" if mark == " " else mark, mark == " ", ".", ragged=True)
         above = [line.text for line in sample.lines[:start]]
@@ -62,16 +62,16 @@ def timed_columns(properties: dict[str, list[str]]) -> list[TimedColumns]:
     """
     names = properties["Name"]
     symbols, units = (padded(properties.get(name, []), len(names)) for name in ("SymbolName", "Unit"))
-    own = [at > 0 and name != "Name" for at, name in enumerate(names)]
+    own = [index > 0 and name != "Name" for index, name in enumerate(names)]
     unique = unique_names([name if is_own else "" for name, is_own in zip(names, own)], symbols)
     groups: list[TimedColumns] = []
-    for at, is_channel in enumerate(own):
+    for index, is_channel in enumerate(own):
         if not is_channel:
-            groups.append(TimedColumns(Column(TIME, "ms", key=at), ()))
+            groups.append(TimedColumns(Column(TIME, "ms", key=index), ()))
             continue
-        symbol, unit = symbols[at], QUANTITY.sub("", units[at])
-        if name := unique[at]:  # older exports end each row with a delimiter
-            column = Column(name, unit, aliases=(symbol,) if symbol not in ("", name) else (), key=at)
+        symbol, unit = symbols[index], QUANTITY.sub("", units[index])
+        if name := unique[index]:  # older exports end each row with a delimiter
+            column = Column(name, unit, aliases=(symbol,) if symbol not in ("", name) else (), key=index)
             groups[-1] = TimedColumns(groups[-1].time, (*groups[-1].channels, column))
     return [group for group in groups if group.channels]
 

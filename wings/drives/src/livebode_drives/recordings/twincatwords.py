@@ -19,8 +19,8 @@ def properties_of_words(lines: Sequence[str]) -> dict[str, list[str]]:
     Symbols have no blanks and thus show how many channels follow each time column. Where a group has more words than
     channels, its channels go by their symbols, with a number where several have one symbol.
 
-    >>> found = properties_of_words(["Name i Name my pos vel", "SymbolName A.i SymbolName A.p A.v"])
-    >>> found["Name"]
+    >>> properties = properties_of_words(["Name i Name my pos vel", "SymbolName A.i SymbolName A.p A.v"])
+    >>> properties["Name"]
     ['Name', 'i', 'Name', 'A.p', 'A.v']
     """
     rows = {line.split(" ")[0]: line for line in lines if not any(f"Unit{ending}" in line for ending in OTHER)}
@@ -30,21 +30,21 @@ def properties_of_words(lines: Sequence[str]) -> dict[str, list[str]]:
     names = list(groups(rows.get("Name", "").split(), "Name"))
     if len(names) != len(symbols):
         return {}
-    found = {
+    properties = {
         "SymbolName": joined("SymbolName", symbols),
         "Name": joined("Name", [named(words, own) for words, own in zip(names, unique, strict=True)]),
     }
     parts = re.split(r"(?:^| )Unit ", rows.get("Unit", ""))[1:]
     units = [[unit.strip() for unit in UNIT.findall(part)] for part in parts]
     if [len(group) for group in units] == [len(group) for group in symbols]:
-        found["Unit"] = joined("Unit", units)
-    return found
+        properties["Unit"] = joined("Unit", units)
+    return properties
 
 
 def groups(words: Sequence[str], key: str) -> Iterator[list[str]]:
     """The words behind each `key`."""
-    at = [k for k, word in enumerate(words) if word == key]
-    for first, last in zip(at, [*at[1:], len(words)], strict=True):
+    places = [k for k, word in enumerate(words) if word == key]
+    for first, last in zip(places, [*places[1:], len(words)], strict=True):
         yield list(words[first + 1 : last])
 
 

@@ -52,16 +52,16 @@ def walk(file: IO[bytes], size: int) -> tuple[bytes, list[str]]:
     """The definitions as a file of their own, and the topic of each subscription."""
     definitions = [file.read(HEAD_BYTES)]
     topics: list[str] = []
-    at, appended = HEAD_BYTES, list[int]()
-    while at + HEAD.size <= size:
+    position, appended = HEAD_BYTES, list[int]()
+    while position + HEAD.size <= size:
         length, kind = HEAD.unpack(file.read(HEAD.size))
-        after = at + HEAD.size + length
+        after = position + HEAD.size + length
         if appended and after > appended[0]:  # what a crash cut off, before the data that was appended
-            at = appended.pop(0)
-            file.seek(at)
+            position = appended.pop(0)
+            file.seek(position)
             continue
         if kind not in KINDS and not 0 < length <= UNKNOWN_BYTES_MAX:
-            raise damaged(f"there is no message at byte {at}", byte=at)
+            raise damaged(f"there is no message at byte {position}", byte=position)
         if after > size:
             break
         if kind in b"FAB":
@@ -74,7 +74,7 @@ def walk(file: IO[bytes], size: int) -> tuple[bytes, list[str]]:
                 appended = [offset for offset in struct.unpack_from("<3Q", content.ljust(40, b"\0"), 16) if offset]
         else:
             file.seek(length, io.SEEK_CUR)
-        at = after
+        position = after
     return b"".join(definitions), topics
 
 

@@ -23,7 +23,7 @@ def twincat(text: str) -> tuple[str, str]:
 
     Examples
     --------
-    >>> from livebode_drives.structured_text.ring import ring_type
+    >>> from livebode_drives.structured_text.project import ring_type
     >>> twincat(ring_type(2, rate_hz=4000))[0]
     'ST_LivebodeRing.TcDUT'
     """
@@ -33,9 +33,9 @@ def twincat(text: str) -> tuple[str, str]:
         inner = f"    <Declaration>{_literal(pou['declaration'])}</Declaration>\n{body}"
         tag = f'POU Name="{name}" Id="{_identity(name)}" SpecialFunc="None"'
     else:
-        found = _TYPE.search(text)
-        assert found is not None
-        name, ending = found["name"], "TcDUT"
+        match = _TYPE.search(text)
+        assert match is not None
+        name, ending = match["name"], "TcDUT"
         inner = f"    <Declaration>{_literal(text)}</Declaration>\n"
         tag = f'DUT Name="{name}" Id="{_identity(name)}"'
     return f"{name}.{ending}", (

@@ -19,10 +19,15 @@ from dataclasses import replace
 from pathlib import Path
 
 from livebode.core import ArchiveError, write_whole
-from livebode_plant.archive.job import Job
-from livebode_plant.archive.recording_places import ArchivedRecording
-from livebode_plant.archive.results import HashedContent, RecordingResults, Result, TrackingFailure, failed
-from livebode_plant.archive.tasks import handle_one
+from livebode_plant.archive.archived_recordings import (
+    ArchivedRecording,
+    HashedContent,
+    RecordingResults,
+    Result,
+    TrackingFailure,
+    failed,
+)
+from livebode_plant.archive.tasks import Job, handle_one
 
 _LOOK_S = 0.1
 _KILLED_MAX = 3
@@ -33,13 +38,13 @@ def handle_alone(job: Job, recording: ArchivedRecording, scratch: Path | None = 
     started = time.perf_counter()
     hashed = handle_one(job, replace(recording, recipes=()), scratch)
     results: list[Result] = list(hashed.results)
-    found = next((one.content for one in results if isinstance(one, HashedContent)), recording.content)
-    if not any(isinstance(one, TrackingFailure) for one in results) and not (
-        not recording.content and job.knows(found)
+    content = next((result.content for result in results if isinstance(result, HashedContent)), recording.content)
+    if not any(isinstance(result, TrackingFailure) for result in results) and not (
+        not recording.content and job.knows(content)
     ):
         for recipe in recording.recipes:
-            one = replace(recording, content=found, recipes=(recipe,))
-            results += _tracked_alone(job, one, scratch)
+            alone = replace(recording, content=content, recipes=(recipe,))
+            results += _tracked_alone(job, alone, scratch)
     return RecordingResults(tuple(results), time.perf_counter() - started)
 
 
@@ -75,8 +80,8 @@ def _once_alone(job: Job, recording: ArchivedRecording, scratch: Path | None) ->
                 process.kill()
         result = folder / "result"
         if result.exists():
-            found: Sequence[Result] = pickle.loads(result.read_bytes())
-            return found
+            results: Sequence[Result] = pickle.loads(result.read_bytes())
+            return results
     raise _exceeded(job) if exceeded else _ended(process.returncode)
 
 

@@ -2,16 +2,82 @@
 
 from __future__ import annotations
 
+import os
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 from urllib.parse import urlsplit
 
-from pydantic import Field, ValidationError
+from pydantic import Field
 
 from livebode.configuration import Axis, File, Schema, read_table, schema_of, tables_of
-from livebode.core import ConfigError, on_loopback
-from livebode_plant.archive.template import Template
-from livebode_plant.settings_section import SettingsSection, first_error
+from livebode.core import LEVELS, ConfigError, on_loopback
+from livebode_plant.settings_section import SettingsFile, SettingsSection, place_beside
+
+_PARTS = re.compile(r"\*\*/|\*|\?|\{(\w*)\}")
+_WILD = {"**/": "(?:.*/)?", "*": "[^/]*", "?": "[^/]"}
+
+
+@dataclass(frozen=True)
+class Template:
+    """A path or URL with *, ** and ?, and with {site}, {line}, {machine} and {axis}, each the name of a directory."""
+
+    text: str
+
+    def checked(self, key: str = "inputs") -> None:
+        """ConfigError if a name in braces is not a level of a machine, or is there twice."""
+        names = [part[1] for part in _PARTS.finditer(self.text) if part[0].startswith("{")]
+        for name in names:
+            if name not in LEVELS or names.count(name) > 1:
+                fault = "is there twice" if name in LEVELS else "is not a level of a machine"
+                raise ConfigError(
+                    "value-invalid",
+                    f"{{{name}}} in {self.text!r} {fault}",
+                    "write {site}, {line}, {machine} and {axis}, each once",
+                    key=key,
+                    value=self.text,
+                )
+
+    @property
+    def pattern(self) -> str:
+        """The pattern of the files, with * in place of braces.
+
+        >>> Template("plant/{machine}/*.csv").pattern
+        'plant/*/*.csv'
+        """
+        return re.sub(r"\{\w*\}", "*", self.text)
+
+    def machine(self, place: str) -> dict[str, str]:
+        """The levels of the machine that the path of a recording names; none if it does not match.
+
+        >>> Template("plant/{machine}/*.csv").machine("plant/press 4/a.csv")
+        {'machine': 'press 4'}
+        """
+        match = self._expression.fullmatch(place.replace(os.sep, "/"))
+        return match.groupdict() if match else {}
+
+    def filled(self, levels: Mapping[str, str | None]) -> str | None:
+        """The path of the machine with these levels; None if a level in braces is not known.
+
+        >>> Template("baselines/{site}-{machine}.json").filled({"site": "Graz", "machine": "press 4"})
+        'baselines/Graz-press 4.json'
+        """
+        if not all(levels.get(part[1]) for part in _PARTS.finditer(self.text)):
+            return None
+        return _PARTS.sub(lambda part: levels[part[1]] or "", self.text)
+
+    @property
+    def _expression(self) -> re.Pattern[str]:
+        parts, end = [], 0
+        text = self.text.replace(os.sep, "/")
+        for part in _PARTS.finditer(text):
+            parts.append(re.escape(text[end : part.start()]))
+            parts.append(_WILD.get(part[0]) or f"(?P<{part[1]}>[^/]+)")
+            end = part.end()
+        return re.compile("".join([*parts, re.escape(text[end:])]))
+
 
 Text = Annotated[str, Field(min_length=1)]
 
@@ -80,7 +146,7 @@ class ClusterSection(SettingsSection):
             )
 
 
-class ArchiveSettings(SettingsSection):
+class ArchiveSettings(SettingsFile):
     """An archive of recordings, and the lake of their results.
 
     Parameters
@@ -107,42 +173,28 @@ class ArchiveSettings(SettingsSection):
     baselines: Text | None = None
     cluster: ClusterSection = ClusterSection()
 
-    @classmethod
-    def read(cls, path: Path) -> Self:
-        """The settings in a TOML file.
+    def check(self) -> None:
+        """ConfigError if the cluster would be open to others, or a template is invalid."""
+        self.cluster.checked()
+        for template in self.templates:
+            template.checked()
+        if self.baselines is not None:
+            check_baselines(self.baselines, "baselines")
 
-        Raises
-        ------
-        ConfigError
-            If the file cannot be read, is not TOML, or a key or a value is invalid, or a cluster would be open to
-            others.
-        """
-        try:
-            found = cls.model_validate(read_table(path))
-            found.cluster.checked()
-            for template in found.templates:
-                template.checked()
-            if found.baselines is not None:
-                check_baselines(found.baselines, "baselines")
-        except ValidationError as error:
-            raise first_error(error, cls).at(str(path)) from None
-        except ConfigError as error:
-            raise (error if error.place else error.at(str(path))) from None
-        folder = path.absolute().parent
-        return found.model_copy(
-            update={
-                "inputs": [_beside(folder, one) for one in found.inputs],
-                "recipe": folder / found.recipe,
-                "lake": _beside(folder, found.lake),
-                "baselines": None if found.baselines is None else str(folder / found.baselines),
-                "cluster": found.cluster.with_files(folder, "certificate", "key", "authority"),
-            }
-        )
+    def beside(self, folder: Path) -> Self:
+        """The settings with their paths relative to a folder."""
+        folder = folder.absolute()  # places of recordings are stored in the lake
+        places = {
+            "inputs": [place_beside(folder, text) for text in self.inputs],
+            "lake": place_beside(folder, self.lake),
+            "baselines": None if self.baselines is None else str(folder / self.baselines),
+        }
+        return super().beside(folder).model_copy(update=places)
 
     @property
     def templates(self) -> list[Template]:
         """The inputs."""
-        return [Template(one) for one in self.inputs]
+        return [Template(text) for text in self.inputs]
 
     def axes(self) -> dict[str, Axis]:
         """The axes of the recipe by name, whose source.log is a placeholder; a single one has the empty name.
@@ -152,7 +204,7 @@ class ArchiveSettings(SettingsSection):
         ConfigError
             If the recipe is not a configuration of axes without a source, or inputs name the axis as well.
         """
-        found = {}
+        axes = {}
         for name, data in tables_of(read_table(self.recipe), str(self.recipe)).items():
             place = f"{self.recipe}, axis {name}" if name else str(self.recipe)
             if name and any("{axis}" in text for text in self.inputs):
@@ -162,8 +214,8 @@ class ArchiveSettings(SettingsSection):
                     "write * in place of {axis}",
                     key="inputs",
                 ).at(str(self.recipe))
-            found[name] = self._axis(name, data, place)
-        return found
+            axes[name] = self._axis(name, data, place)
+        return axes
 
     def _axis(self, name: str, data: dict[str, Any], place: str) -> Axis:
         source = data.get("source", {})
@@ -209,7 +261,3 @@ def archive_schema() -> Schema:
 def lake_url(target: str) -> str:
     """The lake of an archive.toml, or this path or URL itself."""
     return ArchiveSettings.read(Path(target)).lake if target.lower().endswith(".toml") else target
-
-
-def _beside(folder: Path, place: str) -> str:
-    return place if "://" in place else str(folder / place)

@@ -56,12 +56,12 @@ class MachineRuns:
 
 def machines(lake: Lake) -> list[MachineRuns]:
     """The machines of the lake by name, with the numbers of their runs and of recordings in quarantine."""
-    found: dict[str, MachineRuns] = {}
+    machines_by_name: dict[str, MachineRuns] = {}
     for row in lake.read("runs", _COLUMNS).to_pylist():
-        found.setdefault(path_of(row), MachineRuns(path_of(row))).count(row)
+        machines_by_name.setdefault(path_of(row), MachineRuns(path_of(row))).count(row)
     for row in quarantine(lake):
-        found.setdefault(path_of(row), MachineRuns(path_of(row))).quarantined += 1
-    return [found[name] for name in sorted(found)]
+        machines_by_name.setdefault(path_of(row), MachineRuns(path_of(row))).quarantined += 1
+    return [machines_by_name[name] for name in sorted(machines_by_name)]
 
 
 def quarantine(lake: Lake) -> list[dict[str, Any]]:

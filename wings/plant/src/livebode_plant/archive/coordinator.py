@@ -5,9 +5,10 @@ from __future__ import annotations
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
 from functools import partial
+from operator import attrgetter
 from typing import TYPE_CHECKING
 
 import pyarrow as pa
@@ -16,31 +17,27 @@ from packaging.version import Version
 from livebode.version import __version__
 from livebode_plant.archive.alone import handle_alone
 from livebode_plant.archive.archive_settings import ArchiveSettings
-from livebode_plant.archive.contents import quarantine
-from livebode_plant.archive.groups import RecordingGroups
-from livebode_plant.archive.job import Job, short
-from livebode_plant.archive.recording_places import (
+from livebode_plant.archive.archived_recordings import (
     ArchivedRecording,
-    RecordingPlace,
-    file_rows,
-    find_places,
-    known_contents,
-    levels_of,
-    longest_first,
-    place_of,
-    untracked,
-)
-from livebode_plant.archive.results import (
     HashedContent,
+    RecordingPlace,
     RecordingResults,
     Result,
     TrackedResult,
     TrackingFailure,
     each_result,
+    file_rows,
+    find_places,
+    known_contents,
+    levels_of,
+    longest_first,
     lost,
+    place_of,
+    untracked,
 )
-from livebode_plant.archive.tasks import handle
-from livebode_plant.lake import QUANTITIES, QUARANTINE, RUNS, DataFile, Lake
+from livebode_plant.archive.contents import quarantine
+from livebode_plant.archive.tasks import Job, handle, short
+from livebode_plant.lake import TABLES, DataFile, Lake
 
 if TYPE_CHECKING:
     from livebode_plant.archive.clusters import Cluster
@@ -75,26 +72,25 @@ class Committer:
 
     def commit(self) -> None:
         """Commit what waits; ArchiveError or LocationError if the lake cannot be written."""
-        hashed = [one for one in self._waiting if isinstance(one, HashedContent)]
-        tracked = [one for one in self._waiting if isinstance(one, TrackedResult)]
-        bad = [one for one in self._waiting if isinstance(one, TrackingFailure) and not one.by_storage]
+        hashed = [result for result in self._waiting if isinstance(result, HashedContent)]
+        tracked = [result for result in self._waiting if isinstance(result, TrackedResult)]
+        bad = [result for result in self._waiting if isinstance(result, TrackingFailure) and not result.by_storage]
         if hashed:  # first: what has a result and no known place would be tracked again
-            rows = file_rows([(one.place, one.content) for one in hashed], self.job.common_machine)
-            self.lake.add_rows("files", rows)
+            places = [(result.place, result.content) for result in hashed]
+            self.lake.add_rows("files", file_rows(places, self.job.common_machine))
         by_table: dict[str, list[DataFile]] = {}
-        for one in tracked:
-            for file in one.files:
+        for result in tracked:
+            for file in result.files:
                 by_table.setdefault(file.table, []).append(file)
         for table, files in by_table.items():
             self.lake.add_files(table, files)
-        quantities = [row for one in tracked for row in one.quantities]
-        for name, found, schema in (
-            ("quantities", quantities, QUANTITIES),
-            ("runs", [one.run for one in tracked], RUNS),
-            ("quarantine", [self._quarantined(one) for one in bad], QUARANTINE),
+        for name, rows in (  # a run last: without its row in `runs` a result does not count
+            ("quantities", [row for result in tracked for row in result.quantities]),
+            ("runs", [result.run for result in tracked]),
+            ("quarantine", [self._quarantined(failure) for failure in bad]),
         ):
-            if found:
-                self.lake.add_rows(name, pa.Table.from_pylist(found, schema=schema))
+            if rows:
+                self.lake.add_rows(name, pa.Table.from_pylist(rows, TABLES[name].schema))
         self._waiting.clear()
         self._committed_s = time.monotonic()
 
@@ -199,13 +195,10 @@ class Coordinator:
         self._lake.check()
         places = find_places(self._settings.templates)
         outcome.recordings = len(places)
-        with ExitStack() as stack:
-            try:
-                recordings = self._recordings(places, stack)
-                outcome.known = len(places) - len(recordings) - len(outcome.unreadable)
-                self._handle("tracking", recordings, stack)
-            except (KeyboardInterrupt, SystemExit):
-                outcome.stopped = True
+        with self._until_stopped() as stack:
+            recordings = self._recordings(places, stack)
+            outcome.known = len(places) - len(recordings) - len(outcome.unreadable)
+            self._handle("tracking", recordings, stack)
         return outcome
 
     def retry(self, older: bool) -> ArchiveOutcome:
@@ -215,12 +208,18 @@ class Coordinator:
             rows = [row for row in rows if Version(row["livebode"]) < Version(__version__)]
         self._outcome.recordings = len(rows)
         recordings = [ArchivedRecording(place_of(row), (row["recipe"],), row["content"]) for row in rows]
+        with self._until_stopped() as stack:
+            self._handle("tracking", recordings, stack, alone=True)
+        return self._outcome
+
+    @contextmanager
+    def _until_stopped(self) -> Iterator[ExitStack]:
+        """The context of the cluster; Ctrl-C and SIGTERM end it."""
         with ExitStack() as stack:
             try:
-                self._handle("tracking", recordings, stack, alone=True)
+                yield stack
             except (KeyboardInterrupt, SystemExit):
                 self._outcome.stopped = True
-        return self._outcome
 
     def _recordings(self, places: Sequence[RecordingPlace], stack: ExitStack) -> list[ArchivedRecording]:
         """What is to be tracked, the longest first: contents without a result, and places whose content is not known.
@@ -236,13 +235,13 @@ class Coordinator:
             return untracked(contents, recipes, skipped)
 
         new = [place for place in places if place.known_as not in known]
-        lengths = Counter(place.size_bytes for place in (*new, *(one.place for one in waiting())))
+        lengths = Counter(place.size_bytes for place in (*new, *(recording.place for recording in waiting())))
         alike = [place for place in new if not place.size_bytes or lengths[place.size_bytes] > 1]
         for result in self._handle("reading", [ArchivedRecording(place) for place in alike], stack):
             if isinstance(result, HashedContent):
                 known[result.place.known_as] = result.content
         single = [ArchivedRecording(place, recipes) for place in new if lengths[place.size_bytes] == 1]
-        candidates = {content for one in single for content in by_size.get(one.size_bytes, ())}
+        candidates = {content for recording in single for content in by_size.get(recording.size_bytes, ())}
         done = {content for content in candidates if all((content, recipe) in skipped for recipe in recipes)}
         self._job = replace(self._job, known=frozenset(map(short, done)))
         return longest_first([*waiting(), *single])
@@ -258,15 +257,15 @@ class Coordinator:
         self._outcome.remaining = len(recordings) if tracking else 0
         try:
             for handled in self._distributed(stage, recordings, stack, alone):
-                found = each_result(handled)
-                self._count(found)
+                new = each_result(handled)
+                self._count(new)
                 if tracking:
                     self._outcome.remaining -= len(handled)
                     self._outcome.known += sum(
-                        all(isinstance(x, HashedContent) for x in one.results) for one in handled
+                        all(isinstance(result, HashedContent) for result in recording.results) for recording in handled
                     )
-                results += [] if tracking else found
-                committer.add(found)
+                results += [] if tracking else new
+                committer.add(new)
         finally:
             committer.commit()
         return results
@@ -284,15 +283,15 @@ class Coordinator:
     ) -> Iterator[list[RecordingResults]]:
         """What was found, in the order in which it comes."""
         cluster = self._started(stack)
-        from livebode_plant.archive.distribution import Distribution
+        from livebode_plant.archive.distribution import Distribution, RecordingGroups
 
         groups = RecordingGroups([] if alone else recordings)
-        together, one = partial(handle, self._job), partial(handle_alone, self._job)
+        together, alone_task = partial(handle, self._job), partial(handle_alone, self._job)
         work: Distribution[ArchivedRecording, RecordingResults] = Distribution(
-            cluster, groups, together, one, _again, lost
+            cluster, groups, together, alone_task, attrgetter("again"), lost
         )
         work.last.extend(recordings if alone else ())
-        done, done_bytes, total_bytes = 0, 0, sum(one.size_bytes for one in recordings)
+        done, done_bytes, total_bytes = 0, 0, sum(recording.size_bytes for recording in recordings)
         self._report(Progress(stage, 0, len(recordings), 0, total_bytes, cluster.dashboard))
         try:
             for pairs in work.results():
@@ -312,7 +311,3 @@ class Coordinator:
 
             self._cluster = stack.enter_context(started(self._settings.cluster))
         return self._cluster
-
-
-def _again(handled: RecordingResults) -> bool:
-    return handled.again

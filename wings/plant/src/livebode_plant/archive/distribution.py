@@ -1,23 +1,81 @@
-"""Process items on a cluster: in groups first, one by one where a worker ended, and alone where it ended again."""
+"""Distribution: items on a cluster, in groups first, one by one where a worker ended, alone where it ended again."""
 
 from __future__ import annotations
 
 import time
 from collections import Counter, deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from queue import Empty, SimpleQueue
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, Protocol, TypeVar
 
 from distributed import KilledWorker, get_worker
 from distributed.client import ClosedClientError, FutureCancelledError
 
 from livebode.core import ArchiveError
 from livebode_plant.archive.clusters import Cluster
-from livebode_plant.archive.groups import RecordingGroups, SizedItem
+
+_GROUP_S = (0.2, 10.0)
+_PER_WORKER = 4
+
+
+class SizedItem(Protocol):
+    """What is processed: its length and nothing else is known before."""
+
+    @property
+    def size_bytes(self) -> int: ...
+
 
 S = TypeVar("S", bound=SizedItem)
+
+
+class RecordingGroups(Generic[S]):
+    """What waits to be processed, in groups whose expected time shrinks towards the end.
+
+    A group has at most a quarter of the time that remains for each worker, between 0.2 and 10 s: so a worker has at
+    least four groups where there is enough to do, the overhead of a task is small, and the end is balanced. The time
+    is proportional to the size, with the factor of what was processed so far; until then a group has one item.
+
+    Parameters
+    ----------
+    items
+        In the order in which they are processed: the longest first.
+    """
+
+    def __init__(self, items: Iterable[S]) -> None:
+        self._waiting = deque(items)
+        self._bytes = sum(map(_size, self._waiting))
+        self._done_s = self._done_bytes = 0.0
+
+    def __len__(self) -> int:
+        return len(self._waiting)
+
+    def learn(self, size_bytes: int, seconds: float) -> None:
+        """Take the time of an item that was processed."""
+        self._done_s += seconds
+        self._done_bytes += max(size_bytes, 1)
+
+    def next(self, workers: int) -> list[S]:
+        """The next group."""
+        remaining_s = self._seconds(self._bytes)
+        target_s = min(max(remaining_s / (_PER_WORKER * workers), _GROUP_S[0]), _GROUP_S[1])
+        group: list[S] = []
+        group_s = 0.0
+        while self._waiting and (not group or (self._done_s and group_s < target_s)):
+            group.append(self._waiting.popleft())
+            group_s += self._seconds(_size(group[-1]))
+            self._bytes -= _size(group[-1])
+        return group
+
+    def _seconds(self, size_bytes: float) -> float:
+        return size_bytes * self._done_s / self._done_bytes if self._done_bytes else 0.0
+
+
+def _size(item: SizedItem) -> int:
+    return max(item.size_bytes, 1)
+
+
 R = TypeVar("R")
 
 _IN_FLIGHT = 2
@@ -86,15 +144,15 @@ class Distribution(Generic[S, R]):
                 future = self._arrived.get(timeout=_COUNT_AGAIN_S)
             except Empty:
                 continue
-            if found := self._taken(future):
-                yield found
+            if pairs := self._taken(future):
+                yield pairs
 
     def ready(self) -> list[tuple[S, R]]:
         """The results that have arrived and were not given yet; the rest is dropped."""
-        found = [pair for future in list(self._tasks) if future.status == "finished" for pair in self._taken(future)]
+        results = [pair for future in list(self._tasks) if future.status == "finished" for pair in self._taken(future)]
         self.cluster.client.cancel(list(self._tasks), force=True)
         self._tasks.clear()
-        return found
+        return results
 
     def _expect(self, future: Any, task: tuple[list[S], bool]) -> None:
         self._tasks[future] = task
@@ -123,13 +181,13 @@ class Distribution(Generic[S, R]):
         if future.status not in ("finished", "pending"):
             return self._try_again(items, alone)
         try:
-            found = future.result(timeout=_COUNT_AGAIN_S)
+            handled = future.result(timeout=_COUNT_AGAIN_S)
         except TimeoutError:  # it was on a worker that was lost since then, and is computed again
             self._expect(future, task)
             return []
         except (KilledWorker, FutureCancelledError):
             return self._try_again(items, alone)
-        results = [found] if alone else found
+        results = [handled] if alone else handled
         final = []
         for item, result in zip(items, results):
             if not alone and self.again(result):

@@ -5,8 +5,9 @@ from __future__ import annotations
 import json
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, suppress
+from dataclasses import dataclass
 from datetime import datetime
 from math import isfinite, nan
 from pathlib import Path
@@ -16,20 +17,108 @@ import numpy as np
 import pyarrow as pa
 
 from livebode.analysis import FittedQuantities
-from livebode.configuration import Axis, open_recording, recorded_configuration
-from livebode.core import ArchiveError, Event, MatrixResponses, Responses, writing
+from livebode.configuration import Axis, open_recording, recipe_id, recorded_configuration
+from livebode.core import ArchiveError, ConfigError, Event, MatrixResponses, Responses, writing
 from livebode.locations import local_copy
 from livebode.records import content_sha256, entries_of, lines_in, parameter_rows, to_json
 from livebode.runtime import Destination, Document, FitResults, RecordInOnePiece, run
 from livebode.tables import from_numpy, text
 from livebode.version import __version__
-from livebode_plant.archive.job import Job
-from livebode_plant.archive.recording_places import ArchivedRecording, RecordingPlace, levels_of
-from livebode_plant.archive.results import HashedContent, RecordingResults, Result, TrackedResult, failed
+from livebode_plant.archive.archive_settings import Template
+from livebode_plant.archive.archived_recordings import (
+    ArchivedRecording,
+    HashedContent,
+    RecordingPlace,
+    RecordingResults,
+    Result,
+    TrackedResult,
+    failed,
+    levels_of,
+)
 from livebode_plant.lake import DataFile, Key, Lake
 from livebode_plant.lake.data_file import ResultFileWriter
-from livebode_plant.lake.wide_matrices import covariance_to_wide, entries_to_wide
-from livebode_plant.lake.wide_responses import to_wide
+from livebode_plant.lake.wide_responses import covariance_to_wide, entries_to_wide, to_wide
+
+_DIGITS = 16
+
+
+@dataclass(frozen=True)
+class Job:
+    """What all recordings of an archive have in common.
+
+    Attributes
+    ----------
+    recipes
+        The axes that are tracked of each recording, by the id of their recipe.
+    lake
+        URL of the lake.
+    memory_bytes
+        Memory that tracking one recording may use.
+    baselines
+        Path of the baseline of each machine, with its levels in braces; None: no comparison.
+    known
+        The first 16 digits of contents that have all results already, of those that a new recording may have.
+    """
+
+    recipes: Mapping[str, Axis]
+    lake: str
+    memory_bytes: int
+    baselines: str | None = None
+    known: frozenset[str] = frozenset()
+
+    @classmethod
+    def of(cls, axes: Mapping[str, Axis], lake: str, memory_bytes: int, baselines: str | None = None) -> Job:
+        """The job of a recipe's axes.
+
+        Raises
+        ------
+        ConfigError
+            If two axes have the same settings: their results would have one name.
+        RecordingError
+            If a file of the recipe cannot be read.
+        """
+        named: dict[str, str] = {}
+        for name, axis in axes.items():
+            same = named.setdefault(recipe_id(axis), name)
+            if same != name:
+                raise ConfigError(
+                    "key-conflict",
+                    f"the axes {same} and {name} of the recipe have the same settings, so their results are the same",
+                    "remove one of them, or give it its own channels",
+                    key="axes",
+                    names=[same, name],
+                )
+        return cls({recipe: axes[name] for recipe, name in named.items()}, lake, memory_bytes, baselines)
+
+    def knows(self, content: str) -> bool:
+        """Whether a content has all results already."""
+        return content[:_DIGITS] in self.known
+
+    def machine(self, recipe: str) -> dict[str, str]:
+        """Levels of the machine of a recipe, for recordings whose place names none."""
+        machine = self.recipes[recipe].machine if recipe in self.recipes else None
+        return machine.levels if machine else {}
+
+    def axis_for(self, recipe: str, path: Path, levels: Mapping[str, str | None]) -> Axis:
+        """The recipe for the recording in this file, compared with the baseline of its machine if there is one."""
+        axis = self.recipes[recipe]
+        axis = axis.model_copy(update={"source": axis.source.model_copy(update={"log": path})})
+        file = None if self.baselines is None else Template(self.baselines).filled(levels)
+        if file is None or not Path(file).exists():
+            return axis
+        return axis.model_copy(update={"monitoring": axis.monitoring.model_copy(update={"baseline": Path(file)})})
+
+    @property
+    def common_machine(self) -> dict[str, str]:
+        """The levels that all recipes have in common."""
+        each = [set(self.machine(recipe).items()) for recipe in self.recipes]
+        return dict(sorted(set.intersection(*each)))
+
+
+def short(content: str) -> str:
+    """The digits of a content in `Job.known`."""
+    return content[:_DIGITS]
+
 
 _EVENTS = 10_000
 
@@ -250,12 +339,12 @@ def _results(job: Job, recording: ArchivedRecording, scratch: Path | None) -> It
 
 def _result(job: Job, recording: ArchivedRecording, path: Path, key: Key, scratch: Path | None) -> Result:
     try:
-        found = track(job, recording.place, path, key, scratch)
+        result = track(job, recording.place, path, key, scratch)
         if content_sha256(path) != key.content:
             raise _changed(recording.place.url)
     except Exception as error:
         return failed(recording.place, error, *key)
-    return found
+    return result
 
 
 def _changed(url: object) -> ArchiveError:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,7 +10,6 @@ from numpy.typing import NDArray
 
 from livebode.configuration import Axis, recipe_id
 from livebode.core import (
-    Block,
     Event,
     LivebodeError,
     Parameters,
@@ -27,11 +24,18 @@ from livebode.monitoring import places
 from livebode.preparation import live_follower
 from livebode.runtime import ChangeDetection, SingleResponse
 from livebode.sources.live import LiveBlock, Sequencer, SourceEvents, join_blocks
+from livebode_plant.fleet.alike_axes import (
+    NO_ROWS,
+    Fitted,
+    Output,
+    PendingSpectrum,
+    UnfittedOutput,
+    UsualSpectra,
+    outputs_together,
+)
 from livebode_plant.fleet.event_limits import EventLimits
-from livebode_plant.fleet.fits_together import Fitted, process_together
 from livebode_plant.fleet.main_quantity import MainQuantity, main_quantity, newest_of
 from livebode_plant.fleet.message import read_message
-from livebode_plant.fleet.usual_spectra import PendingSpectrum, UsualSpectra, spectra_together
 
 RESPONSE_BYTES = 130
 """Size of a response at a line, in a message of results."""
@@ -41,47 +45,12 @@ _EVENT_BYTES = 1000
 _FAILURE_LETTERS_MAX = 1000
 FITS_PER_S = 2.0
 """Fits of an axis."""
-_NO_ROWS = np.zeros(0, dtype=np.int64)
 _NO_RECIPE = "unreadable"
 """In place of the recipe of an axis whose files cannot be read: the same for every owner."""
 _logger = logging.getLogger(f"livebode.{__name__}")
 
 
-@dataclass(frozen=True)
-class Output:
-    """What messages of the log gave.
-
-    Attributes
-    ----------
-    number
-        Of the first response, counted from the beginning of the axis's run.
-    responses
-        None if there are none.
-    fitted
-        Numbers of the responses that were fitted, (rows,).
-    parameters
-        Their fits, the quantities derived from them, and the margins, (rows,) each.
-    events
-        Alarms of monitoring among them.
-    """
-
-    number: int
-    responses: Responses | None
-    fitted: NDArray[np.int64]
-    parameters: tuple[Parameters, ...]
-    events: list[Event]
-
-
-class UnfittedOutput(NamedTuple):
-    """What is known before fits: the number of the first response, all responses, which of them are fitted, events."""
-
-    number: int
-    responses: Responses | None
-    to_fit: NDArray[np.int64]
-    events: list[Event]
-
-
-class _TakenMessages(NamedTuple):
+class _MessageGroup(NamedTuple):
     """Messages that are tracked together: number in the log of the last one, its last sample and time, their Blocks,
     and the most bytes of their responses; more than allowed only for a single message."""
 
@@ -133,7 +102,7 @@ class AxisStream(StatefulBase):
         settings = axis.source
         self._sequencer = Sequencer(self._events, reorder=settings.reorder_batches, rate_hz=settings.rate_hz)
         self._pipeline: SingleResponse | None = None
-        self._taken: list[_TakenMessages] = []
+        self._added: list[_MessageGroup] = []
         self.usual: UsualSpectra | None = None
         self.spectra: list[PendingSpectrum] = []
         """The messages taken since the last output, while they are usual ones."""
@@ -160,7 +129,7 @@ class AxisStream(StatefulBase):
             return 0
         before, new = self._events.pending, self._pipeline is None
         spectrum = self.usual and self.usual.spectrum(message, position, log_s, self._sequencer, self._events)
-        if spectrum is not None and self.usual is not None and not self._taken:
+        if spectrum is not None and self.usual is not None and not self._added:
             self.spectra.append(spectrum)
             return self.usual.size_bytes + _EVENT_BYTES * (self._events.pending - before)
         try:
@@ -177,23 +146,23 @@ class AxisStream(StatefulBase):
             self.usual = None
             if self._pipeline is not None and size <= _OUTPUT_BYTES_MAX:
                 self.usual = UsualSpectra.after(message, blocks, size, self._sequencer, self._pipeline)
-        self._take_blocks(position, self._events.position, blocks, size)
+        self._add_blocks(position, self._events.position, blocks, size)
         if new:  # what a follower refuses, it refuses at its first message, without those after it
             self._track()
         return min(size, _OUTPUT_BYTES_MAX) + _EVENT_BYTES * (self._events.pending - before)
 
-    def _take_blocks(self, position: int, end: tuple[int, float], blocks: list[LiveBlock], size_bytes: int) -> None:
-        if self._taken and self._taken[-1].size_bytes + size_bytes <= _OUTPUT_BYTES_MAX:
-            before = self._taken.pop()
+    def _add_blocks(self, position: int, end: tuple[int, float], blocks: list[LiveBlock], size_bytes: int) -> None:
+        if self._added and self._added[-1].size_bytes + size_bytes <= _OUTPUT_BYTES_MAX:
+            before = self._added.pop()
             blocks, size_bytes = before.blocks + blocks, before.size_bytes + size_bytes
-        self._taken.append(_TakenMessages(position, end, blocks, size_bytes))
+        self._added.append(_MessageGroup(position, end, blocks, size_bytes))
 
     def _read_spectra(self) -> None:
         """Process usual messages like any others: they are not tracked with those of other axes."""
         spectra, self.spectra = self.spectra, []
-        for one in spectra:
+        for spectrum in spectra:
             assert self.usual is not None
-            self._take_blocks(one.position, one.end, [self._block(one)], self.usual.size_bytes)
+            self._add_blocks(spectrum.position, spectrum.end, [self._block(spectrum)], self.usual.size_bytes)
 
     def _block(self, spectrum: PendingSpectrum) -> LiveBlock:
         batch = read_message(spectrum.message, spectrum.log_s).with_kinds(self._axis.source.kinds)
@@ -208,7 +177,7 @@ class AxisStream(StatefulBase):
     @property
     def has_more(self) -> bool:
         """Whether it has taken messages that are not tracked, or has events."""
-        return bool(self.spectra or self._taken or self._tracked_events or self._events.pending)
+        return bool(self.spectra or self._added or self._tracked_events or self._events.pending)
 
     def output(self) -> Output:
         """The responses, fits and events of all messages taken since the last call."""
@@ -219,13 +188,18 @@ class AxisStream(StatefulBase):
         self._track()
         first, responses, self._responses = self.responses, self._responses, []
         self.responses += sum(map(len, responses))
-        found = responses[0] if len(responses) == 1 else Responses.join(responses) if responses else None
-        return self.unfitted(first, found)
+        every = responses[0] if len(responses) == 1 else Responses.join(responses) if responses else None
+        return self.unfitted(first, every)
 
     def unfitted(self, number: int, responses: Responses | None) -> UnfittedOutput:
         """These responses, from this number on, with the events until now."""
-        events, self._tracked_events = self._tracked_events, []
-        return UnfittedOutput(number, responses, self._to_fit(responses), events + self._events.take())
+        return UnfittedOutput(number, responses, self._to_fit(responses), self._new_events() + self._events.take())
+
+    def _new_events(self) -> list[Event]:
+        """Events since the last call, in the list that the estimate appends to."""
+        events = list(self._tracked_events)
+        self._tracked_events.clear()
+        return events
 
     @property
     def pipeline(self) -> SingleResponse:
@@ -241,17 +215,17 @@ class AxisStream(StatefulBase):
     def finished(self, tracked: UnfittedOutput, fitted: Fitted | Exception) -> Output:
         """The output, with the fits of the responses that `tracked` lists, or why there are none; monitors both."""
         parameters, events = ((), []) if isinstance(fitted, Exception) else fitted
-        found = [*tracked.events, *events]
+        stored = [*tracked.events, *events]
         try:
             if isinstance(fitted, Exception):
                 raise fitted
-            found += self._monitored(tracked.responses, parameters)
+            stored += self._monitored(tracked.responses, parameters)
         except Exception as error:
             self._fail(error)
-            found, self._tracked_events = found + self._tracked_events, []
-        self._remember(found, parameters)
+            stored += self._new_events()
+        self._remember(stored, parameters)
         return Output(
-            tracked.number, tracked.responses, tracked.number + tracked.to_fit, parameters, self._limits.process(found)
+            tracked.number, tracked.responses, tracked.number + tracked.to_fit, parameters, self._limits.process(stored)
         )
 
     def _monitored(self, responses: Responses | None, parameters: tuple[Parameters, ...]) -> list[Event]:
@@ -275,7 +249,7 @@ class AxisStream(StatefulBase):
         and begins where monitoring expects its rows.
         """
         if self._pipeline is None or self._pipeline.fits is None or responses is None or self.failure:
-            return _NO_ROWS
+            return NO_ROWS
         settings = self._pipeline.follower.settings
         window, rate_hz = settings.lines.window, settings.lines.rate_hz
         apart = max(window, settings.step)
@@ -309,57 +283,52 @@ class AxisStream(StatefulBase):
 
     def _track(self) -> None:
         self._read_spectra()
-        taken, self._taken = self._taken, []
+        taken, self._added = self._added, []
         for part in taken:
-            found: list[Responses] = []
+            tracked: list[Responses] = []
             if not self.failure:
                 try:
-                    found += map(self._tracked, join_blocks(part.blocks))
+                    tracked += map(self._tracked, join_blocks(part.blocks))
                 except Exception as error:
                     self._fail(error)
-            if sum(one.value.size for one in found) * RESPONSE_BYTES > _OUTPUT_BYTES_MAX:
-                what = Message(
+            if sum(batch.value.size for batch in tracked) * RESPONSE_BYTES > _OUTPUT_BYTES_MAX:
+                message = Message(
                     "message {log_message} of the log has too many samples: its responses were dropped",
                     log_message=part.position,
                 )
-                self._tracked_events.append(Event("malformed", *part.end, what))
-                found = []
-            self._responses += [one for one in found if len(one)]
+                self._tracked_events.append(Event("malformed", *part.end, message))
+                tracked = []
+            self._responses += [batch for batch in tracked if len(batch)]
 
     def _new_pipeline(self, rate_hz: float) -> SingleResponse:
         schema = self._sequencer.schema
         follower = live_follower(self._axis, rate_hz, schema.spectra)
-        return SingleResponse.of(self._axis, follower, schema.channels, samples=schema.spectra is None)
+        estimate = SingleResponse.of(self._axis, follower, schema.channels, samples=schema.spectra is None)
+        estimate.events = self._tracked_events
+        return estimate
 
     def _tracked(self, block: LiveBlock) -> Responses:
-        pipeline, events = self.pipeline, self._tracked_events
-        readiness = pipeline.readiness
-        parts: list[Block] = [block]
-        if readiness is not None:
-            events += readiness.take(block)
-            pipeline.follower.set_aside(readiness.spans)
-            parts = readiness.condition.parts(block)
-        if pipeline.detection is not None:
-            for part in parts:
-                events += pipeline.detection.take_samples(part)
-        found = pipeline.follower.process(block, events.append)
-        if pipeline.fits is not None and len(found) and not self.responses:
-            pipeline.fits.process(found[0:0])  # what a model cannot be fitted to, it refuses here
-        return found if readiness is None else readiness.mark(found)
+        """Responses of a Block by the rules of a run: its loop has the same order."""
+        estimate = self.pipeline
+        self._tracked_events += estimate.monitor(block)
+        responses = estimate.process(block)
+        if estimate.fits is not None and len(responses) and not self.responses:
+            estimate.fits.process(responses[0:0])  # what a model cannot be fitted to, it refuses here
+        return responses
 
     def _fail(self, error: Exception) -> None:
         if not isinstance(error, LivebodeError):
             _logger.exception("internal error at message %d of the log", self.position)
         self.failure = (str(error) or type(error).__name__)[:_FAILURE_LETTERS_MAX]
-        what = Message("the axis is not tracked any more: {why}", why=self.failure)
-        self._tracked_events.append(Event("axis-failed", *self._events.position, what))
+        message = Message("the axis is not tracked any more: {why}", why=self.failure)
+        self._tracked_events.append(Event("axis-failed", *self._events.position, message))
 
     @property
     def _identity(self) -> str:
         return self.recipe
 
     def _state(self) -> dict[str, Any]:
-        pending = self._taken or self.spectra
+        pending = self._added or self.spectra
         assert not pending, "a snapshot between take and output would lack samples"
         parts = {} if self._pipeline is None else {name: part.snapshot() for name, part in self._pipeline.parts.items()}
         own = {"sequencer": self._sequencer.snapshot(), "source_events": self._events.rates, "stages": list(parts)}
@@ -375,77 +344,3 @@ class AxisStream(StatefulBase):
             assert rate_hz is not None
             self._pipeline = self._new_pipeline(rate_hz)
             restore_parts(self._pipeline.parts, {name: state[name] for name in self._pipeline.parts})
-
-
-class StackedRows(NamedTuple):
-    """A response of each of several streams: places among the streams, numbers of the responses, and a row for each."""
-
-    at: list[int]
-    numbers: list[int]
-    responses: Responses
-
-
-def outputs_together(streams: Sequence[AxisStream]) -> list[Output]:
-    """The output of each stream, of what it took; what they have in common is computed once, and none depends on
-    another."""
-    stacks, outputs = stacked_together(streams)
-    rows: dict[int, list[tuple[int, Responses]]] = {}
-    for stack in stacks:
-        for row, (i, number) in enumerate(zip(stack.at, stack.numbers)):
-            rows.setdefault(i, []).append((number, stack.responses[row : row + 1]))
-    for i, found in rows.items():
-        events, after = [], None
-        if i in outputs:
-            events, after = outputs[i].events, outputs[i].responses
-        every = Responses.join([*(one for _, one in found), *([] if after is None else [after])])
-        outputs[i] = Output(found[0][0], every, _NO_ROWS, (), events)
-    return [outputs[i] for i in range(len(streams))]
-
-
-def stacked_together(streams: Sequence[AxisStream]) -> tuple[list[StackedRows], dict[int, Output]]:
-    """Results of all streams: those of axes that are alike in one piece, and outputs of all others by their places.
-
-    An axis of the first kind is also among the others if it has events, or further responses.
-    """
-    stacks: list[StackedRows] = []
-    tracked: dict[int, UnfittedOutput] = {}
-    alike: dict[object, list[int]] = {}
-    for i, stream in enumerate(streams):
-        if stream.usual is not None and (len(stream.spectra) == 1 or (stream.spectra and stream.usual.results_only)):
-            alike.setdefault(stream.usual.kind, []).append(i)
-    for members in alike.values():
-        # The first spectrum of each, then the second one: several of a single axis cost less as one Block.
-        while members and (len(members) > 1 or len(streams[members[0]].spectra) == 1):
-            every = [(usual, streams[i].spectra[0]) for i in members if (usual := streams[i].usual) is not None]
-            try:
-                responses, taken = spectra_together(every)
-            except Exception:  # which of them it is shows only alone
-                _logger.exception("internal error while %d axes are tracked together", len(members))
-                break
-            if responses is None:
-                break
-            at = [i for i, one in zip(members, taken) if one]
-            stack = StackedRows(at, [streams[i].stacked() for i in at], responses)
-            if (usual := streams[at[0]].usual) is not None and usual.results_only:
-                stacks.append(stack)
-            else:
-                rows = enumerate(zip(at, stack.numbers))
-                tracked |= {i: streams[i].unfitted(number, responses[row : row + 1]) for row, (i, number) in rows}
-            members = [i for i in at if streams[i].spectra]
-    done = {i for stack in stacks for i in stack.at} | tracked.keys()
-    tracked |= {i: one.tracked() for i, one in enumerate(streams) if i not in done or one.has_more}
-    return stacks, dict(zip(tracked, _fitted_together([streams[i] for i in tracked], [*tracked.values()])))
-
-
-def _fitted_together(streams: Sequence[AxisStream], tracked: Sequence[UnfittedOutput]) -> list[Output]:
-    """What these become; the fits of all axes are one computation."""
-    at = [i for i, one in enumerate(tracked) if len(one.to_fit)]
-    fits, batches = [], []
-    for i in at:
-        found, stages = tracked[i].responses, streams[i].pipeline
-        assert found is not None
-        assert stages.fits is not None
-        fits.append(stages.fits)
-        batches.append(found[tracked[i].to_fit])
-    fitted: dict[int, Fitted | Exception] = dict(zip(at, process_together(fits, batches)))
-    return [stream.finished(one, fitted.get(i, ((), []))) for i, (stream, one) in enumerate(zip(streams, tracked))]

@@ -22,12 +22,12 @@ from livebode.configuration import Axis
 from livebode.core import Lines, counted
 from livebode.simulation import BeltAxis, Sensor, SimulatedAxis
 from livebode.sources.live import Batch
-from livebode_plant.fleet.check import CheckResult, check_results
 from livebode_plant.fleet.coordinator import FleetCoordinator
 from livebode_plant.fleet.edge import Edge, send_edges
 from livebode_plant.fleet.edge_buffer import FILE_BYTES, EdgeBuffer
 from livebode_plant.fleet.fleet_settings import FleetSettings
-from livebode_plant.fleet.log import FleetLog
+from livebode_plant.fleet.log import with_log
+from livebode_plant.fleet.replay import CheckResult, check_results
 from livebode_plant.fleet.server import LogServer
 from livebode_plant.fleet.status import fleet_status, silences
 
@@ -109,15 +109,15 @@ class SimulatedMachines:
         """The batch of an axis with this number."""
         samples = round(BLOCK_S * RATE_HZ)
         first = number * samples
-        at = np.arange(first, first + samples) % self._signals.shape[1]
-        data = self._signals[:, at]
+        places = np.arange(first, first + samples) % self._signals.shape[1]
+        data = self._signals[:, places]
         noise = np.random.default_rng([axis, number]).standard_normal(samples)
         data[2] *= 1 + 0.01 * axis
         data[2] += 1e-3 * noise
         return Batch(first, data.astype("f4").astype("f8"), self._channels, RATE_HZ, epoch=axis + 1)
 
     def __enter__(self) -> Self:
-        self._taking = self._threads.submit(self._take)
+        self._measuring = self._threads.submit(self._measure)
         self._sending = self._threads.submit(self._send)
         return self
 
@@ -126,25 +126,26 @@ class SimulatedMachines:
         self._threads.shutdown()
         for buffer in self._buffers:
             buffer.close()
-        self._taking.result()
+        self._measuring.result()
         self._sending.result()
 
-    def _take(self) -> None:
+    def _measure(self) -> None:
         began = time.monotonic()
         while not self._ended.wait(max(0.0, began + (self.sent + 1) * BLOCK_S - time.monotonic())):
-            self._take_batches(self.sent)
+            self._add_batches(self.sent)
             self.sent += 1
 
-    def _take_batches(self, number: int) -> None:
+    def _add_batches(self, number: int) -> None:
         for axis, edge in enumerate(self._edges):
             edge.add(self.batch(axis, number))
 
     def _send(self) -> None:
-        edges = [(edge, self._taking) for edge in self._edges]
+        edges = [(edge, self._measuring) for edge in self._edges]
         asyncio.run(send_edges(self._settings.log, edges, threading.Event()))
 
 
 PARTITIONS = 8
+_NAME = "livebode demo"
 _STEP_S, _DRAIN_S = 0.25, 30.0
 
 
@@ -171,7 +172,7 @@ def demo(folder: Path, *, axes: int, workers: int, seconds: float, say: Callable
         settings = FleetSettings.read(path)
         configured = settings.read_axes()
         say(f"nats-server stores the log at {server.url}")
-        asyncio.run(_create_streams(settings))
+        with_log(settings.log, _NAME, lambda log: log.create_streams())
         with FleetCoordinator(settings, configured) as coordinator:
             say(f"{workers} workers share {PARTITIONS} partitions")
             with SimulatedMachines(settings) as machines:
@@ -182,10 +183,11 @@ def demo(folder: Path, *, axes: int, workers: int, seconds: float, say: Callable
             say(f"the axes stop after {machines.sent} messages each")
             _drain(coordinator, settings, configured)
             say(_shares(settings, configured))
-        longest = asyncio.run(_longest(settings, killed_s))
+        silent_s = with_log(settings.log, _NAME, lambda log: silences(log, killed_s, time.time()))
+        longest = max(silent_s.values(), default=0.0)
         say(f"longest time without a new result in a partition after the kill: {longest:.1f} s")
         say("computing all responses again from the log, in one process without interruption")
-        return DemoResult(asyncio.run(_check(settings, configured)), longest)
+        return DemoResult(with_log(settings.log, _NAME, lambda log: check_results(log, configured)), longest)
 
 
 def _wait(coordinator: FleetCoordinator, seconds: float) -> None:
@@ -204,11 +206,8 @@ def _kill(settings: FleetSettings, axes: dict[str, Axis], say: Callable[[str], N
 
 
 def _owners(settings: FleetSettings, axes: dict[str, Axis]) -> Counter[str]:
-    async def owners() -> Counter[str]:
-        async with FleetLog(settings.log, "livebode demo") as log:
-            return Counter(one["owner"] for one in (await fleet_status(log, axes))["partitions"])
-
-    return asyncio.run(owners())
+    status = with_log(settings.log, _NAME, lambda log: fleet_status(log, axes))
+    return Counter(partition["owner"] for partition in status["partitions"])
 
 
 def _shares(settings: FleetSettings, axes: dict[str, Axis]) -> str:
@@ -221,25 +220,5 @@ def _drain(coordinator: FleetCoordinator, settings: FleetSettings, axes: dict[st
     until = time.monotonic() + _DRAIN_S
     while time.monotonic() < until:
         _wait(coordinator, 1.5)
-        if not asyncio.run(_waiting(settings, axes)):
+        if not with_log(settings.log, _NAME, lambda log: fleet_status(log, axes))["log"]["waiting"]:
             return
-
-
-async def _create_streams(settings: FleetSettings) -> None:
-    async with FleetLog(settings.log, "livebode demo") as log:
-        await log.create_streams()
-
-
-async def _waiting(settings: FleetSettings, axes: dict[str, Axis]) -> int:
-    async with FleetLog(settings.log, "livebode demo") as log:
-        return int((await fleet_status(log, axes))["log"]["waiting"])
-
-
-async def _longest(settings: FleetSettings, from_s: float) -> float:
-    async with FleetLog(settings.log, "livebode demo") as log:
-        return max((await silences(log, from_s, time.time())).values(), default=0.0)
-
-
-async def _check(settings: FleetSettings, axes: dict[str, Axis]) -> CheckResult:
-    async with FleetLog(settings.log, "livebode check") as log:
-        return await check_results(log, axes)

@@ -278,19 +278,19 @@ def send_sources(
     """
     edges = {key: Edge(key, buffers[key]) for key in sources}
     with ThreadPoolExecutor(max(1, len(sources)), "livebode source") as threads:
-        taking = [threads.submit(_take_all, source, edges[key]) for key, source in sources.items()]
+        taking = [threads.submit(_add_all, source, edges[key]) for key, source in sources.items()]
         try:
             asyncio.run(send_edges(settings, list(zip(edges.values(), taking)), stop))
         finally:
             for key, source in sources.items():
                 source.stop()
                 edges[key].end()
-    for one in taking:
-        one.result()
+    for thread in taking:
+        thread.result()
     return sum(edge.sent for edge in edges.values())
 
 
-def _take_all(source: LiveSource, edge: Edge) -> None:
+def _add_all(source: LiveSource, edge: Edge) -> None:
     for batch in sender_batches(source):
         edge.add(batch)
 

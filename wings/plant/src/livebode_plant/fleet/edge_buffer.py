@@ -71,7 +71,7 @@ class EdgeBuffer:
         self._bytes_max = max(bytes_max, 2 * file_bytes)
         self._lock = threading.Lock()
         self._files: deque[_File] = deque()
-        self._taken: deque[_Message] = deque()
+        self._loaded: deque[_Message] = deque()
         self._next, self._index = 0, 0
         self._open: list[AppendFile] = []
         self._unsynced = False
@@ -135,9 +135,9 @@ class EdgeBuffer:
     def first(self) -> bytes | None:
         """The oldest message; None if there is none."""
         with self._lock:
-            while not self._taken and (self._files[0].count or len(self._files) > 1):
+            while not self._loaded and (self._files[0].count or len(self._files) > 1):
                 self._load()
-            return self._taken[0].data if self._taken else None
+            return self._loaded[0].data if self._loaded else None
 
     def remove(self, message: bytes) -> None:
         """Remove the oldest message, which is stored; one that was dropped meanwhile is not counted as dropped."""
@@ -146,7 +146,7 @@ class EdgeBuffer:
             return
         with self._lock:
             oldest = self._files[0]
-            oldest.start = self._taken.popleft().end
+            oldest.start = self._loaded.popleft().end
             oldest.count -= 1
             if oldest.count:
                 return
@@ -230,11 +230,11 @@ class EdgeBuffer:
     def _load(self) -> None:
         """Read the messages of the oldest file; where none is left, the next file is the oldest one."""
         oldest = self._files[0]
-        self._taken.extend(self._read(oldest))
-        if len(self._taken) < oldest.count:
+        self._loaded.extend(self._read(oldest))
+        if len(self._loaded) < oldest.count:
             self._name_damage(oldest)
-        oldest.count = len(self._taken)
-        if not self._taken and len(self._files) > 1:
+        oldest.count = len(self._loaded)
+        if not self._loaded and len(self._files) > 1:
             self._files.popleft()  # not deleted: what cannot be read now may be readable at the next start
 
     def _name_damage(self, file: _File) -> None:
@@ -251,7 +251,7 @@ class EdgeBuffer:
 
     def _drop(self) -> None:
         self.dropped += self._files[0].count
-        self._taken.clear()
+        self._loaded.clear()
         self._delete_oldest()
 
     def _delete_oldest(self) -> None:

@@ -37,8 +37,8 @@ class EventLimits(StatefulBase):
         """Each kind's events that may be stored at once, time of the newest event, and how many were dropped."""
 
     def process(self, events: Iterable[Event]) -> list[Event]:
-        """Those of these events that are stored."""
-        return [one for event in events for one in ([event] if event.kind in _FULL else self._limited(event))]
+        """Events of these that are stored."""
+        return [stored for event in events for stored in ([event] if event.kind in _FULL else self._limited(event))]
 
     def _limited(self, event: Event) -> list[Event]:
         room, then_s, dropped = self._kinds.get(event.kind, (float(BURST), event.time_s, 0))

@@ -5,16 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from glob import glob
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal, Self
 from urllib.parse import urlsplit
 
-from pydantic import Field, ValidationError
+from pydantic import Field
 
-from livebode.configuration import Axis, ConfigurationFile, File, read_table
+from livebode.configuration import Axis, ConfigurationFile, File
 from livebode.core import ConfigError, FleetError, on_loopback
-from livebode.locations import location
 from livebode_plant.fleet.subjects import axis_key
-from livebode_plant.settings_section import SettingsSection, first_error
+from livebode_plant.settings_section import SettingsFile, SettingsSection, place_beside
 
 PARTITIONS_MAX = 1024
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
@@ -212,13 +211,12 @@ class SinkSection(SettingsSection):
             )
         return self.lake
 
-    def beside(self, folder: Path) -> SinkSection:
-        """With a path of the lake relative to a folder."""
-        place = None if self.lake is None else location(self.lake)
-        return self.model_copy(update={"lake": str(folder / place)}) if isinstance(place, Path) else self
+    def beside(self, folder: Path) -> Self:
+        """The section with a path of the lake relative to a folder."""
+        return self.model_copy(update={"lake": self.lake and place_beside(folder, self.lake)})
 
 
-class FleetSettings(SettingsSection):
+class FleetSettings(SettingsFile):
     """A fleet.
 
     Parameters
@@ -241,42 +239,14 @@ class FleetSettings(SettingsSection):
     leaf: LeafSection | None = None
     users: UsersSection = UsersSection()
 
-    @classmethod
-    def read(cls, path: Path) -> FleetSettings:
-        """The settings of a file, with paths from its folder.
+    def check(self) -> None:
+        """ConfigError if the address of the log is not usable."""
+        self.log.checked()
 
-        Raises
-        ------
-        ConfigError
-            If it cannot be read, or a key or value is invalid; the message gives both.
-        """
-        return cls.of(read_table(path), str(path)).beside(path.parent)
-
-    @classmethod
-    def of(cls, data: dict[str, Any], origin: str) -> FleetSettings:
-        """The settings in plain data; `origin` names it in messages."""
-        try:
-            found = cls.model_validate(data)
-            found.log.checked()
-        except ValidationError as error:
-            raise first_error(error, cls).at(origin) from None
-        except ConfigError as error:
-            raise error.at(origin) from None
-        return found
-
-    def beside(self, folder: Path) -> FleetSettings:
-        """These settings with relative paths from `folder`."""
-        tls = ("certificate", "key", "authority")
-        return self.model_copy(
-            update={
-                "leaf": self.leaf and self.leaf.with_files(folder, *tls),
-                "axes": [str(folder / pattern) for pattern in self.axes],
-                "edge": self.edge.with_files(folder, "buffer"),
-                "sink": self.sink.beside(folder),
-                "log": self.log.with_files(folder, "credentials", "authority"),
-                "server": self.server.with_files(folder, *tls),
-            }
-        )
+    def beside(self, folder: Path) -> Self:
+        """The settings with their paths relative to a folder."""
+        axes = [str(folder / pattern) for pattern in self.axes]
+        return super().beside(folder).model_copy(update={"axes": axes})
 
     def read_axes(self) -> dict[str, Axis]:
         """The axes by their key in the log.

@@ -4,20 +4,61 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import json
 import logging
 import re
 import time
 import uuid
 from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, TypeVar
 
 from livebode.core import FleetError
 from livebode_plant.fleet import subjects
 from livebode_plant.fleet.connection import connected
-from livebode_plant.fleet.consumer import Consumer
 from livebode_plant.fleet.fleet_settings import LogSection
-from livebode_plant.fleet.partition_count import description_of, partitions_changed, partitions_of
+from livebode_plant.fleet.reader import Consumer, StoredMessage
+from livebode_plant.fleet.subjects import LOG_STREAM
+
+_WORD = "partitions"
+
+
+def description_of(count: int) -> str:
+    """The description of the stream.
+
+    >>> partitions_of(description_of(16))
+    16
+    """
+    return f"livebode, {count} {_WORD}"
+
+
+def partitions_of(description: str | None) -> int | None:
+    """The number in a description; None if it has none."""
+    words = (description or "").split()
+    return int(words[-2]) if words[-1:] == [_WORD] and words[-2].isdecimal() else None
+
+
+def partitions_changed(before: int, count: int) -> FleetError:
+    """The error for a number that differs from that of the data in the log."""
+    return FleetError(
+        "partitions-changed",
+        f"the log has data in {before} partitions, and the fleet has partitions = {count}: an axis would continue in "
+        "another partition, without its state and beside its former owner",
+        f"set partitions = {before}, or begin with an empty log",
+        before=before,
+        partitions=count,
+    )
+
+
+def check_store(store: Path, count: int) -> None:
+    """FleetError if the store of a server on this computer has data in another number of partitions."""
+    for about in store.glob(f"jetstream/*/streams/{LOG_STREAM}/meta.inf"):
+        before = partitions_of(json.loads(about.read_text()).get("description"))
+        filled = any(block.stat().st_size for block in about.parent.glob("msgs/*.blk"))
+        if before is not None and before != count and filled:
+            raise partitions_changed(before, count)
+
 
 _logger = logging.getLogger(f"livebode.{__name__}")
 _EXPECTED, _IDENTITY, _WRITE = "Nats-Expected-Last-Subject-Sequence", "Nats-Msg-Id", "Livebode-Write"
@@ -46,17 +87,6 @@ class OtherLastError(Exception):
     def __init__(self, last: int, repeated: bool) -> None:
         super().__init__(last)
         self.last, self.repeated = last, repeated
-
-
-@dataclass(frozen=True)
-class StoredMessage:
-    """A message of a stream: its number there, its data, and when the server received it, seconds since 1970."""
-
-    subject: str
-    number: int
-    data: bytes
-    write: str
-    stored_s: float
 
 
 @dataclass(frozen=True)
@@ -146,13 +176,13 @@ class FleetLog:
 
         async def create() -> None:
             try:
-                found = (await self._js.stream_info(stream.name)).config
+                config = (await self._js.stream_info(stream.name)).config
             except NotFoundError:
                 await self._js.add_stream(stream)
                 return
             limits = {name: getattr(stream, name) for name in _LIMITS if getattr(stream, name) is not None}
-            if update and any(getattr(found, name) != value for name, value in limits.items()):
-                await self._js.update_stream(found.evolve(**limits))
+            if update and any(getattr(config, name) != value for name, value in limits.items()):
+                await self._js.update_stream(config.evolve(**limits))
 
         await self._repeated(create)
 
@@ -251,8 +281,8 @@ class FleetLog:
 
     async def following(self, stream: str, subject: str, number: int) -> int | None:
         """Number of the first message of a subject that is at least `number`."""
-        found = await self._next(stream, subject, number)
-        return None if found is None else found.number
+        message = await self._next(stream, subject, number)
+        return None if message is None else message.number
 
     async def first_since(self, stream: str, subject: str, at_s: float) -> int:
         """Number from which on the messages of a subject were stored at this time or later, seconds since 1970."""
@@ -260,11 +290,11 @@ class FleetLog:
         low, high = extent.first, extent.last + 1
         while low < high:  # between them is the first one
             middle = (low + high) // 2
-            found = await self._next(stream, subject, middle)
-            if found is None or found.stored_s >= at_s:
+            message = await self._next(stream, subject, middle)
+            if message is None or message.stored_s >= at_s:
                 high = middle
             else:
-                low = found.number + 1
+                low = message.number + 1
         return low
 
     async def _next(self, stream: str, subject: str, number: int) -> StoredMessage | None:
@@ -333,6 +363,16 @@ class FleetLog:
         if not self.trouble:
             _logger.warning("the log does not answer (%s); retrying", reason)
         self.trouble = reason
+
+
+def with_log(settings: LogSection, name: str, ask: Callable[[FleetLog], Awaitable[T]]) -> T:
+    """The result of `ask`, which receives a connection of this name; errors as of `FleetLog`."""
+
+    async def connected() -> T:
+        async with FleetLog(settings, name) as log:
+            return await ask(log)
+
+    return asyncio.run(connected())
 
 
 def _stored(raw: Any) -> StoredMessage:

@@ -35,7 +35,7 @@ def main_quantity(parts: Sequence[Parameters], watched: Sequence[str]) -> str:
 
 
 def newest_of(parts: Sequence[Parameters], name: str, detection: ChangeDetection | None) -> MainQuantity | None:
-    """Its newest valid value; None if none of these rows is valid."""
+    """Newest valid value of the quantity; None if none of these rows is valid."""
     part = parts[0] if name in parts[0].names else parts[1]
     valid = np.flatnonzero(part.ok)
     if not valid.size:

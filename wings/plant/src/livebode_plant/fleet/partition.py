@@ -17,12 +17,13 @@ from dataclasses import dataclass
 from typing import Any
 
 from livebode.configuration import Axis
-from livebode_plant.fleet.axis_stream import AxisStream, stacked_together
-from livebode_plant.fleet.log import ClaimLostError, FleetLog, StoredMessage
-from livebode_plant.fleet.page_status import PageStatus
-from livebode_plant.fleet.reader import Reader
+from livebode_plant.fleet.alike_axes import stacked_together
+from livebode_plant.fleet.axis_stream import AxisStream
+from livebode_plant.fleet.log import ClaimLostError, FleetLog
+from livebode_plant.fleet.reader import Reader, StoredMessage
 from livebode_plant.fleet.result_message import PendingResults, ResultMessage
 from livebode_plant.fleet.server_config import PAYLOAD_BYTES_MAX
+from livebode_plant.fleet.status_message import PageStatus
 from livebode_plant.fleet.subjects import (
     LOG,
     LOG_STREAM,
@@ -79,7 +80,7 @@ class StoredStates:
         """Computing time that a takeover would repeat now."""
         return sum(axis.since_s for axis in self._axes.values())
 
-    def took(self, key: str, size_bytes: int, computed_s: float) -> None:
+    def processed(self, key: str, size_bytes: int, computed_s: float) -> None:
         """A message of an axis was processed."""
         axis = self._axes.get(key)
         if axis is None:
@@ -99,8 +100,8 @@ class StoredStates:
         """The axes whose state is to be stored now."""
         now_s = self._clock()
         rested = {key: axis for key, axis in self._axes.items() if axis.rested(now_s)}
-        found = [key for key, axis in rested.items() if STATE_SHARE * axis.since_bytes >= axis.size_bytes]
-        return found + list(self._too_long(rested, set(found)))
+        large = [key for key, axis in rested.items() if STATE_SHARE * axis.since_bytes >= axis.size_bytes]
+        return large + list(self._too_long(rested, set(large)))
 
     def _too_long(self, rested: dict[str, _Axis], found: set[str]) -> Iterator[str]:
         left_s = self.replay_s - sum(rested[key].since_s for key in found)
@@ -235,20 +236,20 @@ class PartitionOwner:
         """Process messages until their results are enough for a message of results; returns the others."""
         stored = bisect_right(messages, self._through, key=lambda message: message.number)
         began_s = time.thread_time()
-        sizes, taken = self._take(messages[:stored] or messages)
+        sizes, taken = self._add_messages(messages[:stored] or messages)
         keys, streams = list(sizes), [self._streams[key] for key in sizes]
         stacks, outputs = stacked_together(streams)
         a_byte_s = (time.thread_time() - began_s) / max(1, sum(sizes.values()))
         for key, size in sizes.items():
-            self._stored.took(key, size, size * a_byte_s)
+            self._stored.processed(key, size, size * a_byte_s)
         if not stored:
             for stack in stacks:
-                self._pending.add_rows([keys[i] for i in stack.at], [streams[i] for i in stack.at], stack)
+                self._pending.add_rows([keys[i] for i in stack.indices], [streams[i] for i in stack.indices], stack)
             for i, output in outputs.items():
                 self._pending.add(keys[i], streams[i], output)
         return messages[taken:]
 
-    def _take(self, messages: Sequence[StoredMessage]) -> tuple[dict[str, int], int]:
+    def _add_messages(self, messages: Sequence[StoredMessage]) -> tuple[dict[str, int], int]:
         """Hand messages to their axes until the results may be enough; returns their bytes by axis, and how many it
         took.
 
@@ -268,16 +269,16 @@ class PartitionOwner:
         return sizes, len(messages)
 
     def _stream(self, key: str, number: int) -> AxisStream | None:
-        found = self._streams.get(key)
-        if found is None and key in self._axes:
-            found = self._streams[key] = AxisStream(self._axes[key], number)
-        if found is None:
+        stream = self._streams.get(key)
+        if stream is None and key in self._axes:
+            stream = self._streams[key] = AxisStream(self._axes[key], number)
+        if stream is None:
             if key not in self._unknown:
                 if len(self._unknown) >= _UNKNOWN_MAX:
                     return None
                 _logger.warning("the fleet has no axis %s, whose data arrive", axis_path(key))
             self._unknown[key] = self._unknown.get(key, 0) + 1
-        return found
+        return stream
 
     def _until_due_s(self) -> float:
         """Time until results are due. The partitions of a process take turns, so that they do not wait for another."""

@@ -1,4 +1,4 @@
-"""Messages of results: responses and parameters of the axes of a partition, with its events."""
+"""Messages of results: responses and parameters of the axes of a partition as tables, with its events."""
 
 from __future__ import annotations
 
@@ -6,22 +6,115 @@ import json
 import struct
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
-from typing import Any
+from hashlib import blake2b
+from typing import Any, NamedTuple
 
+import numpy as np
 import pyarrow as pa
+from numpy.typing import NDArray
 
-from livebode.core import FleetError
-from livebode_plant.fleet.axis_stream import RESPONSE_BYTES, AxisStream, Output, StackedRows
-from livebode_plant.fleet.wide_rows import (
-    PARAMETERS,
-    ROWS,
-    AxesRows,
-    AxisFits,
-    AxisRows,
-    grid_of,
-    parameter_table,
-    response_table,
+from livebode.core import FleetError, Parameters, Responses
+from livebode.records import PARAMETER_SCHEMA, parameter_rows
+from livebode.tables import from_numpy, text
+from livebode_plant.fleet.alike_axes import Output, StackedRows
+from livebode_plant.fleet.axis_stream import RESPONSE_BYTES, AxisStream
+from livebode_plant.lake.wide_responses import wide_columns, wide_schema
+
+_PLACE = (("axis", pa.string()), ("run", pa.int64()), ("number", pa.int64()))
+_DIGEST_BYTES = 8
+_BITS = (
+    "first", "sample", "time_s", "schedule", "dof", "ready", "valid", "value", "weight", "sigma", "coherence",
+    "input_coherence", "distortion",
+)  # fmt: skip
+_WIDE = pa.schema(
+    [
+        field.with_type(pa.list_(field.type.value_type)) if pa.types.is_fixed_size_list(field.type) else field
+        for field in wide_schema(1)
+    ]
 )
+ROWS = pa.schema([*_PLACE, ("digest", pa.int64()), *_WIDE])
+"""A row for each response: key of the axis; number in the log of the first message of its run; number of the response
+within that run; digest of all its bits in full precision; and the columns of `wide_schema`, as lists of any length,
+since the axes of a partition have different lines. `from_wide` reads those of one axis."""
+PARAMETERS = pa.schema([*_PLACE, *pa.schema(PARAMETER_SCHEMA)])
+"""A row for each parameter, derived quantity and margin of a fitted response, which has this number; the other columns
+are those of parameters.parquet."""
+
+
+class AxisRows(NamedTuple):
+    """Responses of one axis or of several: key, run and number of each row."""
+
+    axes: Sequence[str]
+    runs: Sequence[int]
+    numbers: Sequence[int]
+    responses: Responses
+
+    @classmethod
+    def of(cls, axis: str, run: int, number: int, responses: Responses) -> AxisRows:
+        """Consecutive responses of a run of an axis, from this number on."""
+        count = len(responses)
+        return cls([axis] * count, [run] * count, range(number, number + count), responses)
+
+
+class AxisFits(NamedTuple):
+    """Parameters of the responses with these numbers, (rows,), of a run of an axis."""
+
+    axis: str
+    run: int
+    numbers: NDArray[np.int64]
+    parameters: Parameters
+
+
+def response_table(parts: Sequence[AxisRows]) -> pa.Table:
+    """Rows of `ROWS`, part by part."""
+    if not parts:
+        return ROWS.empty_table()
+    every = [part.responses for part in parts]
+    own = [
+        text([axis for part in parts for axis in part.axes]),
+        from_numpy(np.array([run for part in parts for run in part.runs], dtype=np.int64)),
+        from_numpy(np.array([number for part in parts for number in part.numbers], dtype=np.int64)),
+        from_numpy(np.concatenate([digests(batch) for batch in every])),
+    ]
+    return pa.Table.from_arrays([*own, *wide_columns(every, _WIDE)], schema=ROWS)
+
+
+def parameter_table(parts: Sequence[AxisFits]) -> pa.Table:
+    """Rows of `PARAMETERS`; axes with the same model are converted at once."""
+    alike: dict[object, list[AxisFits]] = {}
+    for part in parts:
+        if len(part.parameters):
+            fits = part.parameters
+            alike.setdefault((fits.model, fits.names, fits.units), []).append(part)
+    batches = []
+    for members in alike.values():
+        every = Parameters.join([part.parameters for part in members])
+        width = len(every.names)
+        counts = [width * len(part.numbers) for part in members]
+        place = [
+            text([part.axis for part in members], np.repeat(np.arange(len(members)), counts)),
+            from_numpy(np.repeat([part.run for part in members], counts)),
+            from_numpy(np.repeat(np.concatenate([part.numbers for part in members]), width)),
+        ]
+        batches.append(pa.Table.from_arrays([*place, *pa.table(parameter_rows(every)).columns], schema=PARAMETERS))
+    return pa.concat_tables([PARAMETERS.empty_table(), *batches]).combine_chunks()
+
+
+def digests(responses: Responses) -> NDArray[np.int64]:
+    """A digest of all bits of each response, shape (rows,): stored rows are rounded, so it proves what was computed."""
+    rows = len(responses)
+    columns = [getattr(responses, name) for name in _BITS]
+    table = np.hstack([np.ascontiguousarray(column).view(np.uint8).reshape(rows, -1) for column in columns])
+    content = b"".join(blake2b(row, digest_size=_DIGEST_BYTES).digest() for row in table)
+    return np.frombuffer(content, np.int64)
+
+
+def grid_of(responses: Responses) -> Mapping[str, Any]:
+    """What `from_wide` needs besides the rows: an entry ``found`` of run.json."""
+    lines = responses.lines
+    grid = {"bins": list(lines.bins), "quiet_bins": list(lines.quiet), "window": lines.window}
+    return grid | {"rate_hz": lines.rate_hz, "quantity": responses.quantity, "unit": responses.unit}
+
 
 _EVENT_BYTES = 500
 """Size of an event without its sentence."""
@@ -44,10 +137,10 @@ class ResultMessage:
     claim
         Whether it only claims the partition, without results.
     rows
-        Responses as in `wide_rows.ROWS`, one row for each (axis, run, number), rounded to float32, each with a digest
+        Responses as in `ROWS`, one row for each (axis, run, number), rounded to float32, each with a digest
         of its exact bits. `from_wide(rows of one axis, grids[axis])` gives them as Responses.
     parameters
-        As in `wide_rows.PARAMETERS`: one row for each parameter, derived quantity and margin of (axis, run, number).
+        As in `PARAMETERS`: one row for each parameter, derived quantity and margin of (axis, run, number).
     events
         With axis, run, kind, sample, time_s, message and details each; alarms of monitoring are among them.
     recipes
@@ -112,7 +205,7 @@ class PendingResults:
     """Outputs that are not stored yet."""
 
     def __init__(self) -> None:
-        self._responses: list[AxisRows | AxesRows] = []
+        self._responses: list[AxisRows] = []
         self._parameters: list[AxisFits] = []
         self._events: list[dict[str, Any]] = []
         self._recipes: dict[str, str] = {}
@@ -128,7 +221,7 @@ class PendingResults:
         # The details repeat the message as its template and its facts.
         self.nbytes += sum(_EVENT_BYTES + 3 * len(event.message) for event in output.events)
         if output.responses is not None:
-            self._responses.append(AxisRows(key, stream.run, output.number, output.responses))
+            self._responses.append(AxisRows.of(key, stream.run, output.number, output.responses))
             self.nbytes += output.responses.value.size * RESPONSE_BYTES
         for parameters in output.parameters:
             self._parameters.append(AxisFits(key, stream.run, output.fitted, parameters))
@@ -139,7 +232,7 @@ class PendingResults:
     def add_rows(self, keys: Sequence[str], streams: Sequence[AxisStream], stack: StackedRows) -> None:
         """Append the responses of several axes."""
         runs = [stream.run for stream in streams]
-        self._responses.append(AxesRows(keys, runs, stack.numbers, stack.responses))
+        self._responses.append(AxisRows(keys, runs, stack.numbers, stack.responses))
         self.nbytes += stack.responses.value.size * RESPONSE_BYTES
         for key, stream in zip(keys, streams):
             self._recipes[key], self._logged_s[key] = stream.recipe, stream.log_s
@@ -149,7 +242,7 @@ class PendingResults:
         self._events.append({"axis": key, **event})
 
     def message(self, through: int, owner: str) -> ResultMessage:
-        """All of them as one message."""
+        """One message of all outputs."""
         return ResultMessage(
             through,
             owner,
@@ -162,8 +255,7 @@ class PendingResults:
         )
 
     def _grids(self) -> dict[str, Mapping[str, Any]]:
-        found: dict[str, Mapping[str, Any]] = {}
+        grids: dict[str, Mapping[str, Any]] = {}
         for part in self._responses:
-            grid = grid_of(part.responses)
-            found |= dict.fromkeys([part.axis] if isinstance(part, AxisRows) else part.axes, grid)
-        return found
+            grids |= dict.fromkeys(part.axes, grid_of(part.responses))
+        return grids

@@ -12,9 +12,7 @@ from pathlib import Path
 from typing import Self
 
 from livebode.core import FleetError
-from livebode_plant.fleet.server_access import OPEN, ServerAccess
-from livebode_plant.fleet.server_cluster import ClusterMember
-from livebode_plant.fleet.server_config import server_configuration
+from livebode_plant.fleet.server_config import OPEN, ClusterMember, ServerAccess, server_configuration
 
 _START_S, _STEP_S = 10.0, 0.02
 _given: set[int] = set()

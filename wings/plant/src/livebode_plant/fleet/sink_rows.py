@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from livebode.core import LEVELS
 from livebode.tables import from_numpy, to_numpy
-from livebode_plant.fleet.log import StoredMessage
+from livebode_plant.fleet.reader import StoredMessage
 from livebode_plant.fleet.result_message import ResultMessage
 from livebode_plant.fleet.subjects import axis_names
-from livebode_plant.lake import FLEET_EVENTS, FLEET_PARAMETERS, FLEET_RESPONSES, FLEET_RUNS
+from livebode_plant.lake import TABLES
 
 US = 1_000_000
 DELETED = "results-deleted"
@@ -80,8 +80,8 @@ def sink_rows(message: StoredMessage, log: str) -> SinkRows:
         _Results(rows, result.recipes, logged_s, message.stored_s) for rows in (result.rows, result.parameters)
     )
     tables = {
-        "fleet_responses": responses.table(FLEET_RESPONSES, log),
-        "fleet_parameters": parameters.table(FLEET_PARAMETERS, log),
+        "fleet_responses": responses.table("fleet_responses", log),
+        "fleet_parameters": parameters.table("fleet_parameters", log),
         "fleet_events": event_rows(result.events, result.recipes, logged_s, message.stored_s, log),
     }
     parts = list(responses.parts())
@@ -97,38 +97,35 @@ def event_rows(
     log: str,
 ) -> pa.Table:
     """Rows of events; those without an axis belong to the log."""
-    found = []
+    rows = []
     for event in events:
         key = event.get("axis", "")
-        logged = datetime.fromtimestamp(logged_s.get(key, stored_s), UTC)
-        own = {name: event.get(name) for name in ("run", "kind", "sample", "time_s", "message")}
-        found.append(
-            own
-            | (dict(zip(LEVELS, axis_names(key))) if key else {})
-            | {"log": log, "recipe": recipes.get(key), "logged": logged, "day": logged.date()}
-            | {"details": json.dumps(event.get("details", {}), ensure_ascii=False)}
-        )
-    return pa.Table.from_pylist(found, FLEET_EVENTS)
+        own = {name: event.get(name) for name in ("kind", "sample", "time_s", "message")}
+        own["details"] = json.dumps(event.get("details", {}), ensure_ascii=False)
+        place = run_place(key, event.get("run"), recipes.get(key), log)
+        rows.append(place | own | dated("logged", logged_s.get(key, stored_s)))
+    return pa.Table.from_pylist(rows, TABLES["fleet_events"].schema)
 
 
 def run_rows(runs: Mapping[RunKey, Mapping[str, Any]], logged_s: Mapping[RunKey, float], log: str) -> pa.Table:
     """Rows of runs, from the grid of each and when its first response was logged."""
-    found = []
+    rows = []
     for key, grid in runs.items():
-        logged = datetime.fromtimestamp(logged_s[key], UTC)
         own = {name: grid[name] for name in ("rate_hz", "window", "quantity", "unit", "bins", "quiet_bins")}
-        place = dict(zip(LEVELS, axis_names(key.axis)))
-        frequencies = [k * grid["rate_hz"] / grid["window"] for k in grid["bins"]]
-        about = {"log": log, "run": key.run, "recipe": key.recipe, "logged": logged, "day": logged.date()}
-        found.append(own | place | about | {"frequencies_hz": frequencies})
-    return pa.Table.from_pylist(found, FLEET_RUNS)
+        own["frequencies_hz"] = [k * grid["rate_hz"] / grid["window"] for k in grid["bins"]]
+        rows.append(run_place(*key, log) | own | dated("logged", logged_s[key]))
+    return pa.Table.from_pylist(rows, TABLES["fleet_runs"].schema)
 
 
-def mean_place(key: RunKey, begin_us: int, log: str) -> dict[str, Any]:
-    """The columns of a row of means that say to what it belongs."""
-    begin = datetime.fromtimestamp(begin_us / US, UTC)
-    about = {"log": log, "run": key.run, "recipe": key.recipe, "logged_from": begin, "day": begin.date()}
-    return dict(zip(LEVELS, axis_names(key.axis))) | about
+def run_place(axis: str, run: int | None, recipe: str | None, log: str) -> dict[str, Any]:
+    """Columns of the run that a row belongs to; without an axis those of the log."""
+    return dict(zip(LEVELS, axis_names(axis) if axis else ())) | {"log": log, "run": run, "recipe": recipe}
+
+
+def dated(column: str, time_s: float) -> dict[str, Any]:
+    """The column with this time of the log, and the day that the row is stored in."""
+    time = datetime.fromtimestamp(time_s, UTC)
+    return {column: time, "day": time.date()}
 
 
 class _Results:
@@ -144,14 +141,16 @@ class _Results:
         logged = np.array([logged_s.get(key, stored_s) for key in self._keys], np.float64)
         self._logged_us = np.rint(logged * US).astype(np.int64)[self._codes]
 
-    def table(self, schema: pa.Schema, log: str) -> pa.Table:
-        """The rows for the lake."""
+    def table(self, name: str, log: str) -> pa.Table:
+        """The rows for a table of the lake."""
+        schema = TABLES[name].schema
         logged = from_numpy(self._logged_us).cast(pa.timestamp("us", tz="UTC"))
         names = list(zip(*map(axis_names, self._keys))) or [()] * len(LEVELS)
         own: dict[str, pa.Array[Any]] = {level: self._each(words) for level, words in zip(LEVELS, names)}
         own |= {"recipe": self._each(self._recipes), "log": pa.repeat(pa.scalar(log, pa.string()), len(self._codes))}
         own |= {"logged": logged, "day": logged.cast(pa.timestamp("us")).cast(pa.date32())}
-        columns = [(own[one.name] if one.name in own else self._rows[one.name]).cast(one.type) for one in schema]
+        every = {name: self._rows[name] for name in self._rows.column_names} | own
+        columns = [every[field.name].cast(field.type) for field in schema]
         return pa.table(columns, schema=schema)
 
     def parts(self) -> Iterator[RunPart]:

@@ -17,20 +17,21 @@ from livebode.core import LEVELS, ArchiveError, Responses, SignalError, counted
 from livebode.fitting import RunningMean
 from livebode.tables import Table
 from livebode_plant.fleet.fleet_settings import SinkSection
-from livebode_plant.fleet.log import StoredMessage
+from livebode_plant.fleet.reader import StoredMessage
 from livebode_plant.fleet.sink_rows import (
     DELETED,
     US,
     RunKey,
     RunPart,
     SinkRows,
+    dated,
     event_rows,
-    mean_place,
+    run_place,
     run_rows,
     sink_rows,
 )
 from livebode_plant.fleet.subjects import RESULT_STREAM, axis_names
-from livebode_plant.lake import FLEET_SCHEMAS, PARAMETER_MEANS, RESPONSE_MEANS, Lake, StreamTable
+from livebode_plant.lake import TABLES, Lake, StreamTable
 from livebode_plant.lake.wide_responses import from_wide, to_wide
 
 MINUTE_S, HOUR_S = 60, 3600
@@ -122,7 +123,7 @@ class MeanTier:
         self._now_s = max(self._now_s, message.stored_s)
         self._begins.setdefault(int(self._now_s // self._period_s), message.number)
         ended = int((self._now_s - _LATE_S) // self._period_s) - 1
-        found = self._close(ended, log) if ended > self.closed else None
+        closed = self._close(ended, log) if ended > self.closed else None
         counted = self._now_s - _LATE_S < (self.closed + 1) * self._period_s
         for part in message.responses:
             for key, rows in self._periods(part, counted=counted):
@@ -131,7 +132,7 @@ class MeanTier:
         for part in message.parameters:
             for key, rows in self._periods(part, counted=counted):
                 self._parameters.setdefault(key, FittedQuantities()).add(Table.from_arrow(rows))
-        return found
+        return closed
 
     def _periods(self, part: RunPart, *, counted: bool) -> Iterator[tuple[PeriodKey, pa.Table]]:
         """The rows of each period; without those of periods that are closed, if they were `counted` there."""
@@ -144,45 +145,42 @@ class MeanTier:
     def _close(self, through: int, log: str) -> ClosedPeriods:
         own = [key for key in self._responses if key.period <= through]
         fitted = [key for key in self._parameters if key.period <= through]
+        responses, parameters = f"fleet_responses_{self.name}", f"fleet_parameters_{self.name}"
         tables = {
-            f"fleet_responses_{self.name}": self._response_table([(k, self._responses.pop(k)) for k in own], log),
-            f"fleet_parameters_{self.name}": self._parameter_table([(k, self._parameters.pop(k)) for k in fitted], log),
+            responses: self._response_table(responses, [(key, self._responses.pop(key)) for key in own], log),
+            parameters: self._parameter_table(parameters, [(key, self._parameters.pop(key)) for key in fitted], log),
         }
         self.closed = through
         self._begins = {period: number for period, number in self._begins.items() if period > through}
         return ClosedPeriods(through, min(self._begins.values()), tables)
 
-    def _response_table(self, groups: list[tuple[PeriodKey, _Responses]], log: str) -> pa.Table:
-        tables = [RESPONSE_MEANS.empty_table()]
+    def _response_table(self, name: str, groups: list[tuple[PeriodKey, _Responses]], log: str) -> pa.Table:
+        schema = TABLES[name].schema
+        tables = [schema.empty_table()]
         for key, group in groups:
             row = self._place(key, log) | {"responses": group.count}
             wide = to_wide(group.result())
-            columns = [
-                wide[one.name].cast(one.type) if one.name in wide.column_names else pa.array([row[one.name]], one.type)
-                for one in RESPONSE_MEANS
-            ]
-            tables.append(pa.table(columns, schema=RESPONSE_MEANS))
+            columns = [wide[f.name].cast(f.type) if f.name in wide.column_names else pa.array([row[f.name]], f.type)
+                       for f in schema]  # fmt: skip
+            tables.append(pa.table(columns, schema=schema))
         return pa.concat_tables(tables)
 
-    def _parameter_table(self, groups: list[tuple[PeriodKey, FittedQuantities]], log: str) -> pa.Table:
+    def _parameter_table(self, name: str, groups: list[tuple[PeriodKey, FittedQuantities]], log: str) -> pa.Table:
         rows = [
-            {name: value for name, value in vars(quantity.point).items() if name in PARAMETER_MEANS.names}
-            | self._place(key, log)
-            for key, fitted in groups
-            for quantity in fitted.quantities
+            vars(quantity.point) | self._place(key, log) for key, fitted in groups for quantity in fitted.quantities
         ]
-        return pa.Table.from_pylist(rows, PARAMETER_MEANS)
+        return pa.Table.from_pylist(rows, TABLES[name].schema)
 
     def _place(self, key: PeriodKey, log: str) -> dict[str, Any]:
-        return mean_place(key.run, key.period * self._period_s * US, log)
+        return run_place(*key.run, log) | dated("logged_from", key.period * self._period_s)
 
 
-def _invalid(one: Responses) -> Responses:
+def _invalid(newest: Responses) -> Responses:
     return replace(
-        one,
-        value=np.full_like(one.value, complex(np.nan, np.nan)),
-        sigma=np.full_like(one.sigma, np.nan),
-        valid=np.zeros_like(one.valid),
+        newest,
+        value=np.full_like(newest.value, complex(np.nan, np.nan)),
+        sigma=np.full_like(newest.sigma, np.nan),
+        valid=np.zeros_like(newest.valid),
     )
 
 
@@ -246,7 +244,8 @@ class SinkTables:
     def __init__(self, settings: SinkSection) -> None:
         self._settings = settings
         self.lake = Lake(settings.url)
-        self._waiting = {name: _WaitingRows(StreamTable(self.lake, name)) for name in FLEET_SCHEMAS}
+        names = [name for name, table in TABLES.items() if table.days]
+        self._waiting = {name: _WaitingRows(StreamTable(self.lake, name)) for name in names}
         self.totals = SinkTotals()
 
     def resume(self, created_s: float) -> int:
@@ -281,7 +280,9 @@ class SinkTables:
 
     def process(self, messages: list[StoredMessage]) -> list[pa.Table]:
         """Add the next messages, and commit if it is time; returns the events that are new."""
-        events = [rows.tables["fleet_events"] for message in messages if (rows := self._take(message)) is not None]
+        events = [
+            rows.tables["fleet_events"] for message in messages if (rows := self._add_message(message)) is not None
+        ]
         full = sum(waiting.nbytes for waiting in self._waiting.values()) > _WAITING_BYTES_MAX
         if full or time.monotonic() >= self._due_s:
             self._due_s = time.monotonic() + self._settings.commit_s
@@ -290,7 +291,7 @@ class SinkTables:
                 self._clean_while_running()
         return events
 
-    def _take(self, message: StoredMessage) -> SinkRows | None:
+    def _add_message(self, message: StoredMessage) -> SinkRows | None:
         """Add a message; returns its rows if the lake does not have them."""
         if message.number > self._next:
             self._report_deleted(message)

@@ -46,15 +46,15 @@ def compact(lake: Lake) -> list[CompactionResult]:
         If a table cannot be read or written, or its directory has files that livebode did not write.
     """
     lake.check()
-    found = []
-    for name in [name for name, one in TABLES.items() if not one.days]:
+    results = []
+    for name in [name for name, table in TABLES.items() if not table.days]:
         try:
-            found.append(_compacted(lake, name))
+            results.append(_compacted(lake, name))
         except ArchiveError as error:
             if error.code != "archive.lake-damaged":
                 raise
             warnings.warn(str(error), DamageWarning, stacklevel=2)
-    return [one for one in found if one is not None]
+    return [table for table in results if table is not None]
 
 
 def _compacted(lake: Lake, name: str) -> CompactionResult | None:
@@ -69,13 +69,13 @@ def _compacted(lake: Lake, name: str) -> CompactionResult | None:
     with lake.reported(name):
         if lake.opened(name) is None:
             return None
-        files = list(lake.snapshot(name).files.values())
+        files = lake.files(name)
         waiting = _open_results(lake, name, files)
         if not waiting:
             for group in small_files(files):
                 lake.join(name, group, joined)
         removed = lake.remove_unused(name, RETENTION_HOURS)
-        return CompactionResult(name, len(files), len(lake.snapshot(name).files), removed, waiting)
+        return CompactionResult(name, len(files), len(lake.files(name)), removed, waiting)
 
 
 def _open_results(lake: Lake, name: str, files: list[DataFile]) -> int:

@@ -1,4 +1,4 @@
-"""DataFile: a Parquet file of a table, whose name contains the SHA-256 of its bytes."""
+"""DataFile: a Parquet file of a table, whose name has the SHA-256 of its bytes; Snapshot: the files of a version."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import hashlib
 import json
 import re
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from datetime import date
 from pathlib import Path
@@ -15,6 +15,7 @@ from typing import Any, Final, NamedTuple, Self
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
+from deltalake import CommitProperties, DeltaTable, Transaction
 from deltalake.transaction import AddAction, RemoveAction
 
 from livebode.core import replace_file
@@ -177,14 +178,6 @@ def _column(rows: pa.Table, field: pa.Field[Any]) -> Any:
     return pa.nulls(rows.num_rows, field.type)
 
 
-def write_data_file(folder: Path, table: str, key: Key, parts: Iterable[pa.Table]) -> DataFile:
-    """Write the rows of one result, without the key's columns, to a file in this directory; none if it has no rows."""
-    with ResultFileWriter(folder, table, key) as writer:
-        for part in parts:
-            writer.write(part)
-        return writer.finish()
-
-
 def parquet_writer(path: Path | pa.BufferOutputStream, schema: pa.Schema) -> pq.ParquetWriter:
     """A Parquet file with the layout of wide responses, without Arrow's own schema: a lake has one for all files."""
     return pq.ParquetWriter(path, schema, store_schema=False, **wide_options(schema))
@@ -206,7 +199,7 @@ def small_files(files: Iterable[DataFile]) -> Iterator[list[DataFile]]:
     group: list[DataFile] = []
     small = (file for file in files if file.size_bytes < _SMALL_BYTES)
     for file in sorted(small, key=lambda file: (str(file.day), file.name)):
-        full = sum(one.size_bytes for one in group) + file.size_bytes > _JOINED_BYTES_MAX
+        full = sum(member.size_bytes for member in group) + file.size_bytes > _JOINED_BYTES_MAX
         if group and (full or file.day != group[0].day):
             yield from [group] * (len(group) > 1)
             group = []
@@ -220,3 +213,93 @@ def _named(of: str, sha256: str) -> str:
 
 def _now_ms() -> int:
     return time.time_ns() // 1_000_000
+
+
+_ENTRY: Final = "livebode"
+"""Name of livebode's entry in a commit."""
+
+
+class DamagedTableError(Exception):
+    """A table, most often its log, is damaged."""
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """What a version of a table consists of.
+
+    A flipped bit in a log of Delta, or in a checkpoint of it, can drop a file, add a removed one again or change a
+    position without an error. So each commit contains a digest of all that the table consists of after it.
+
+    Attributes
+    ----------
+    table
+        Name of the table.
+    columns
+        Names of its columns.
+    files
+        By name.
+    positions
+        In streams.
+    """
+
+    table: str
+    columns: tuple[str, ...]
+    files: Mapping[str, DataFile]
+    positions: Mapping[str, int]
+
+    @classmethod
+    def read(cls, name: str, table: DeltaTable, commit: bytes) -> Self:
+        """What the log says, which is compared with the digest in the last `commit`.
+
+        Raises
+        ------
+        DamagedTableError
+            If they differ, or the log names a file that is not in the directory of the table.
+        """
+        try:
+            actions = [json.loads(line) for line in commit.splitlines()]
+            entry = json.loads(next(action["commitInfo"] for action in actions if "commitInfo" in action)[_ENTRY])
+            digest, streams = entry["digest"], [str(stream) for stream in entry["streams"]]
+        except (KeyError, TypeError, ValueError, StopIteration, RecursionError):
+            raise DamagedTableError(f"version {table.version()} has no digest") from None
+        positions = {stream: table.transaction_version(stream) or 0 for stream in streams}
+        files = {file.name: file for file in _files(name, table)}
+        snapshot = cls(name, tuple(field.name for field in table.schema().fields), files, positions)
+        if snapshot._digest != digest:
+            raise DamagedTableError(f"the digest in version {table.version()} is not that of its files")
+        return snapshot
+
+    def after(
+        self, added: Iterable[DataFile], removed: Iterable[DataFile], positions: Mapping[str, int] | None = None
+    ) -> Self:
+        """What the table consists of after a commit."""
+        names = {file.name for file in removed}
+        files = {name: file for name, file in self.files.items() if name not in names}
+        files |= {file.name: file for file in added}
+        return type(self)(self.table, self.columns, files, {**self.positions, **(positions or {})})
+
+    def commit_properties(self, positions: Mapping[str, int] | None = None) -> CommitProperties:
+        """Properties of the commit that leads to this, with these new positions."""
+        entry = json.dumps({"digest": self._digest, "streams": sorted(self.positions)})
+        new = [Transaction(stream, position) for stream, position in (positions or {}).items()]
+        return CommitProperties({_ENTRY: entry}, max_commit_retries=0, app_transactions=new)
+
+    @property
+    def _digest(self) -> str:
+        files = sorted((file.name, file.size_bytes, file.rows, str(file.day)) for file in self.files.values())
+        content = [self.table, self.columns, files, sorted(self.positions.items())]
+        return hashlib.sha256(json.dumps(content).encode()).hexdigest()
+
+
+def _files(name: str, table: DeltaTable) -> list[DataFile]:
+    actions = pa.table(table.get_add_actions(flatten=True))
+    none: list[Any] = [None] * actions.num_rows
+    columns = ("path", "size_bytes", "num_records", "partition.day")
+    values = [actions[column].to_pylist() if column in actions.column_names else none for column in columns]
+    files = [DataFile(name, *column) for column in zip(*values)]
+    for file in files:
+        try:
+            file.of  # noqa: B018 - checks the name
+        except ValueError as error:
+            raise DamagedTableError(str(error)) from None
+    return files

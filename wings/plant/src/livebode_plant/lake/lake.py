@@ -2,48 +2,37 @@
 
 from __future__ import annotations
 
-import hashlib
 import shutil
-import warnings
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.dataset as ds
-import pyarrow.parquet as pq
 from deltalake import DeltaTable
 from deltalake.exceptions import CommitFailedError, DeltaError, TableNotFoundError
-from pyarrow.fs import FileSystem, LocalFileSystem, PyFileSystem, SubTreeFileSystem
 
-from livebode.core import ArchiveError, DamageWarning, LocationError, whole_file
-from livebode.locations import (
-    Location,
-    find,
-    location,
-    make_parent,
-    opened,
-    read_bytes,
-    reporting,
-    write_whole,
-)
-from livebode.records import VerifiedFiles
-from livebode_plant.lake.data_file import DataFile, Key, file_bytes
+from livebode.core import ArchiveError, whole_file
+from livebode.locations import find, make_parent, opened, read_bytes, reporting, write_whole
+from livebode_plant.lake.data_file import DamagedTableError, DataFile, Key, Snapshot, file_bytes
 from livebode_plant.lake.schemas import TABLES
-from livebode_plant.lake.snapshot import DamagedTableError, Snapshot
+from livebode_plant.lake.table_content import FOLDER, LOG, TableContent
 from livebode_plant.lake.table_directory import check_directory, check_names, delta_options, remove_data
 
 Row = tuple[Any, ...]
-FOLDER = "tables"
-"""Directory of the tables in that of the lake, where a user may have other files too."""
-_DOWNLOADS = 8
-_LOG = "_delta_log"
 
 
-class Lake:
+class Change(NamedTuple):
+    """Files that a commit adds to a table and removes from it, and positions in streams that it contains."""
+
+    added: Sequence[DataFile]
+    removed: Sequence[DataFile] = ()
+    positions: Mapping[str, int] | None = None
+
+
+class Lake(TableContent):
     """The results of an archive; the tables are created when something is written.
 
     A commit is a compare-and-set on the version of its table: what another process has written is known before
@@ -56,19 +45,10 @@ class Lake:
     """
 
     def __init__(self, url: str) -> None:
-        place = location(url)
-        self._place: Location = (place.absolute() if isinstance(place, Path) else place) / FOLDER
-        self.url = str(place)
+        super().__init__(url)
         self._tables: dict[str, DeltaTable] = {}
         self._snapshots: dict[str, tuple[int, Snapshot]] = {}
         self._known: dict[str, tuple[int, set[Row]]] = {}
-        self._verified: set[tuple[str, str]] = set()
-        self._damaged: dict[tuple[str, str], str] = {}
-        self._warned: set[tuple[str, str]] = set()
-
-    def place_of(self, name: str) -> Location:
-        """The directory of a table."""
-        return self._place / name
 
     def check(self, *names: str) -> None:
         """Check that the directories of these tables, or of all, have nothing that livebode did not write.
@@ -107,7 +87,7 @@ class Lake:
     def read(self, name: str, columns: Sequence[str] | None = None, where: pc.Expression | None = None) -> pa.Table:
         """The rows of a table as they are now, in no order; none if nothing was written yet.
 
-        Rows of results that are not complete are included; see `quantities`. A damaged file is left out with a
+        Rows of results that are not complete are included; see `counted`. A damaged file is left out with a
         `DamageWarning`.
 
         Raises
@@ -116,9 +96,26 @@ class Lake:
             If the table cannot be read.
         """
         with self.reported(name):
-            return self._reported_rows(name, self._files(name), columns, where)
+            return self._reported_rows(name, self.files(name), columns, where)
 
-    def rows(self, name: str) -> ds.Dataset | None:
+    def counted(
+        self,
+        name: str,
+        columns: Sequence[str] | None = None,
+        where: pc.Expression | None = None,
+        runs: pc.Expression | None = None,
+    ) -> pa.Table:
+        """Rows as of `read`, but only of results that count: those with a row in `runs`, or in a part of that table.
+
+        Raises
+        ------
+        ArchiveError
+            If a table cannot be read.
+        """
+        rows, keys = self.read(name, columns, where), self.read("runs", Key._fields, runs)
+        return rows.filter(pc.is_in(_key_words(rows), value_set=_key_words(keys).combine_chunks()))
+
+    def lazy_rows(self, name: str) -> ds.Dataset | None:
         """The rows of a table as they are now, not read yet; None if nothing was written.
 
         Call `report_damage` when they were read.
@@ -129,11 +126,7 @@ class Lake:
             If the table cannot be read.
         """
         with self.reported(name):
-            if self.opened(name) is None:
-                return None
-            files, schema = {file.name: file for file in self._files(name)}, TABLES[name].schema
-            opened = VerifiedFiles(schema, lambda path: self._whole(files[path]))
-            return _dataset(files.values(), schema, PyFileSystem(opened))
+            return None if self.opened(name) is None else self.dataset(name, self.files(name))
 
     def rows_of(self, name: str, key: Key) -> pa.Table:
         """The rows of one result in a table of responses, parameters or events, read from as few files as possible.
@@ -147,22 +140,15 @@ class Lake:
         """
         where = (pc.field("content") == key.content) & (pc.field("recipe") == key.recipe)
         with self.reported(name):
-            files = self._files(name)
+            files = self.files(name)
             own = [file for file in files if file.key == key]
             chosen = own or [file for file in files if file.key is None]
             return self._reported_rows(name, chosen, None, where).sort_by("sample")
 
     def file_rows(self, file: DataFile, columns: Sequence[str] | None = None, where: Any = None) -> pa.Table | None:
         """The rows of one file of a table; None, and a `DamageWarning`, if it is damaged."""
-        found = self._reported_rows(file.table, [file], columns, where)
-        return None if (file.table, file.name) in self._damaged else found
-
-    def quantities(self) -> pa.Table:
-        """The quantities of the results that count, those with a row in `runs`."""
-        key = TABLES["runs"].key
-        found, counted = self.read("quantities"), set(_rows_of(self.read("runs", key), key))
-        keys = zip(found["content"].to_pylist(), found["recipe"].to_pylist())
-        return found.filter(pa.array([key in counted for key in keys], pa.bool_()))
+        rows = self._reported_rows(file.table, [file], columns, where)
+        return None if self.damage(file.table, file.name) else rows
 
     def keys(self, name: str) -> set[Row]:
         """The keys of the rows of a table.
@@ -175,23 +161,29 @@ class Lake:
         with self.reported(name):
             return self._keys(name)
 
+    def files(self, name: str) -> list[DataFile]:
+        """The files of a table at its newest version; none if it does not exist."""
+        return [] if self.opened(name) is None else list(self.snapshot(name).files.values())
+
     def add_rows(self, name: str, rows: pa.Table) -> int:
         """Append the rows whose key is not in the table, and return their number."""
-        with self.reported(name):
-            while True:
-                self.created(name)
-                if (name, _LOG) in self._damaged:
-                    return 0
-                present, own = self._keys(name), _rows_of(rows, TABLES[name].key)
-                new = rows.filter(pa.array([key not in present for key in own], pa.bool_()))
-                if not new.num_rows:
-                    return 0
-                file, data = file_bytes(name, "rows", new)
-                write_whole(self.place_of(name) / file.name, data)
-                if self.commit(name, [file]):
-                    present.update(own)
-                    self._known[name] = (self._tables[name].version(), present)
-                    return int(new.num_rows)
+        own, new, present = _rows_of(rows, TABLES[name].key), rows, set[Row]()
+
+        def change() -> Change | None:
+            nonlocal new, present
+            present = self._keys(name)
+            new = rows.filter(pa.array([key not in present for key in own], pa.bool_()))
+            if not new.num_rows:
+                return None
+            file, data = file_bytes(name, "rows", new)
+            write_whole(self.place_of(name) / file.name, data)
+            return Change([file])
+
+        if not self.append(name, change):
+            return 0
+        present.update(own)  # in place: the keys of the table are not read again
+        self._known[name] = self._tables[name].version(), present
+        return int(new.num_rows)
 
     def add_files(self, name: str, files: Sequence[DataFile]) -> None:
         """Add files that are in the table's directory already, except those of results that count already.
@@ -199,14 +191,34 @@ class Lake:
         Another file of the same result, for example of another version of livebode, is replaced. A result counts once
         it has a row in `runs`.
         """
+
+        def change() -> Change | None:
+            counted = self.keys("runs")
+            new = [file for file in files if file.rows and file.key not in counted]
+            keys = {file.key for file in new}
+            return Change(new, [file for file in self.files(name) if file.key in keys]) if new else None
+
+        if files:
+            self.append(name, change)
+
+    def append(self, name: str, change: Callable[[], Change | None]) -> bool:
+        """Commit a change of the newest version of a table: the one way in which rows come into a lake.
+
+        Where another process has committed in the same moment, the change is asked for again. False if there is none,
+        or if the log of an advisory table is damaged.
+
+        Raises
+        ------
+        ArchiveError
+            If the table cannot be written.
+        """
         with self.reported(name):
-            while files:
+            while True:
                 self.created(name)
-                counted = self.keys("runs")
-                files = [file for file in files if file.rows and file.key not in counted]
-                keys = {file.key for file in files}
-                if not files or self.commit(name, files, [file for file in self._files(name) if file.key in keys]):
-                    return
+                if self.damage(name) or (new := change()) is None:
+                    return False
+                if self.commit(name, *new):
+                    return True
 
     def store(self, path: Path, table: str) -> None:
         """Put a file in the directory of a table, completely or not at all.
@@ -241,14 +253,14 @@ class Lake:
 
         The `positions` in streams are stored in the same commit. Not `changed`: the same rows are in other files.
         """
-        table, one = self._tables[name], TABLES[name]
+        table, kind = self._tables[name], TABLES[name]
         before, after = table.version(), self.snapshot(name).after(added, removed, positions)
         names = {file.name for file in added}
         actions = [file.removed(changed=changed) for file in removed if file.name not in names]
         try:
             table.create_write_transaction(
-                [*actions, *(file.added(changed=changed) for file in added)], "append", one.schema,
-                partition_by=one.partitions, commit_properties=after.commit_properties(positions),
+                [*actions, *(file.added(changed=changed) for file in added)], "append", kind.schema,
+                partition_by=kind.partitions, commit_properties=after.commit_properties(positions),
             )  # fmt: skip
         except CommitFailedError:
             table.update_incremental()
@@ -281,95 +293,24 @@ class Lake:
     def _keys(self, name: str) -> set[Row]:
         if self.opened(name) is None:
             return set()
-        version, found = self._known.get(name, (-1, set()))
+        version, keys = self._known.get(name, (-1, set()))
         if version != self._tables[name].version():
-            key, files = list(TABLES[name].key), self._files(name)
-            found = set(_rows_of(self._rows(name, files, key), key))
-            damaged = [file.name for file in files if (name, file.name) in self._damaged]
+            key, files = TABLES[name].key, self.files(name)
+            keys = set(_rows_of(self.rows(name, files, key), key))
+            damaged = [file.name for file in files if self.damage(name, file.name)]
             if damaged and not TABLES[name].advisory:
-                raise DamagedTableError(f"its file {damaged[0]} {self._damaged[name, damaged[0]]}")
+                raise DamagedTableError(f"its file {damaged[0]} {self.damage(name, damaged[0])}")
             self.report_damage()
-            self._known[name] = (self._tables[name].version(), found)
-        return found
-
-    def _files(self, name: str) -> list[DataFile]:
-        return [] if self.opened(name) is None else list(self.snapshot(name).files.values())
+            self._known[name] = (self._tables[name].version(), keys)
+        return keys
 
     def _reported_rows(
         self, name: str, files: Sequence[DataFile], columns: Sequence[str] | None, where: pc.Expression | None
     ) -> pa.Table:
         """Rows of files, with a `DamageWarning` for those that are damaged."""
-        rows = self._rows(name, files, columns, where)
+        rows = self.rows(name, files, columns, where)
         self.report_damage()
         return rows
-
-    def _rows(
-        self, name: str, files: Sequence[DataFile], columns: Sequence[str] | None, where: pc.Expression | None = None
-    ) -> pa.Table:
-        """Rows of files, in threads of Arrow that know nothing of Python.
-
-        A thread that releases something of Python while Python ends aborts the process.
-        """
-        own, schema = list(columns) if columns else None, TABLES[name].schema
-
-        def downloaded(file: DataFile) -> pa.Table:
-            source = self._whole(file)
-            return None if source is None else pq.read_table(source, columns=own, filters=where, schema=schema)
-
-        place = self.place_of(name)
-        with ThreadPoolExecutor(_DOWNLOADS) as pool:
-            if isinstance(place, Path):
-                whole = [file for file, source in zip(files, pool.map(self._whole, files)) if source is not None]
-                system = SubTreeFileSystem(str(place), LocalFileSystem())
-                rows = _dataset(whole, schema, system).to_table(columns=own, filter=where)
-            else:
-                empty = schema.empty_table()
-                parts = [part for part in pool.map(downloaded, files) if part is not None]
-                rows = pa.concat_tables([empty.select(own) if own else empty, *parts])
-        return rows
-
-    def _whole(self, file: DataFile) -> pa.NativeFile | None:
-        """A file whose bytes have the SHA-256 that is in its name."""
-        place, known = self.place_of(file.table) / file.name, (file.table, file.name)
-        try:
-            if isinstance(place, Path):
-                if known not in self._verified:
-                    with place.open("rb") as content:
-                        self._verify(file, hashlib.file_digest(content, "sha256").hexdigest())
-                return pa.OSFile(str(place)) if known in self._verified else None
-            data = read_bytes(place)
-            self._verify(file, hashlib.sha256(data).hexdigest())
-            return pa.BufferReader(data) if known in self._verified else None
-        except (FileNotFoundError, LocationError) as error:
-            if isinstance(error, LocationError) and error.code != "location.not-found":
-                raise
-            self._damaged[known] = "is missing"
-            return None
-
-    def _verify(self, file: DataFile, sha256: str) -> None:
-        if sha256 == file.sha256:
-            self._verified.add((file.table, file.name))
-            self._damaged.pop((file.table, file.name), None)  # restored
-        else:
-            self._damaged[file.table, file.name] = "is damaged: its SHA-256 is not the one in its name"
-
-    @property
-    def damaged(self) -> list[str]:
-        """Files that are left out because they are damaged or missing, as far as they were read."""
-        return [f"{FOLDER}/{table}/{name}" for table, name in sorted(self._damaged)]
-
-    def report_damage(self) -> None:
-        """Name each file that was found damaged, once, by a `DamageWarning`."""
-        for (table, name), fault in sorted(self._damaged.items()):
-            if (table, name) not in self._warned:
-                self._warned.add((table, name))
-                again = (
-                    f", or delete the directory {FOLDER}/{table}: it is written again" if TABLES[table].advisory else ""
-                )
-                rest = f"its rows are left out; restore it from a backup{again}"
-                warnings.warn(
-                    f"lake {self.url!r}: {FOLDER}/{table}/{name} {fault}; {rest}", DamageWarning, stacklevel=2
-                )
 
     def exists(self, name: str) -> bool:
         """Whether there is a table, readable or not.
@@ -379,18 +320,18 @@ class Lake:
         LocationError
             If the storage does not answer.
         """
-        log = self.place_of(name) / _LOG
+        log = self.place_of(name) / LOG
         return any(log.glob("*.json")) if isinstance(log, Path) else bool(find(f"{log.address}/*.json"))
 
     def snapshot(self, name: str) -> Snapshot:
         """What a table that was opened consists of at its newest version."""
         table = self._tables[name]
-        version, found = self._snapshots.get(name, (-1, None))
-        if found is None or version != table.version():
+        version, snapshot = self._snapshots.get(name, (-1, None))
+        if snapshot is None or version != table.version():
             version = table.version()
-            found = Snapshot.read(name, table, read_bytes(self.place_of(name) / _LOG / f"{version:020}.json"))
-            self._snapshots[name] = version, found
-        return found
+            snapshot = Snapshot.read(name, table, read_bytes(self.place_of(name) / LOG / f"{version:020}.json"))
+            self._snapshots[name] = version, snapshot
+        return snapshot
 
     def opened(self, name: str) -> DeltaTable | None:
         """The table at its newest version; None if it does not exist, or is advisory and its log is damaged."""
@@ -407,20 +348,20 @@ class Lake:
         except DamagedTableError as error:
             if not TABLES[name].advisory:
                 raise
-            self._damaged[name, _LOG] = f"is damaged: {error}"
+            self.set_damage(name, LOG, f"is damaged: {error}")
             self.report_damage()
             return None
         return self._tables[name]
 
     def created(self, name: str) -> None:
         """Open the table at its newest version, which may be a new one."""
-        if self.opened(name) is not None or (name, _LOG) in self._damaged:
+        if self.opened(name) is not None or self.damage(name):
             return
-        one = TABLES[name]
-        new = Snapshot(name, tuple(one.schema.names), {}, {})
+        kind = TABLES[name]
+        new = Snapshot(name, tuple(kind.schema.names), {}, {})
         with suppress(CommitFailedError):  # another process has created it in the same moment
             DeltaTable.create(
-                self._uri(name), one.schema, mode="ignore", partition_by=one.partitions,
+                self._uri(name), kind.schema, mode="ignore", partition_by=kind.partitions,
                 storage_options=delta_options(self._place), commit_properties=new.commit_properties(),
             )  # fmt: skip
         self._tables[name] = self._table(name)
@@ -482,20 +423,10 @@ class Lake:
             ) from error
 
 
-def _dataset(files: Iterable[DataFile], schema: pa.Schema, system: FileSystem) -> ds.FileSystemDataset:
-    parquet = ds.ParquetFileFormat()
-    fragments = [parquet.make_fragment(one.name, system, partition_expression=_contents_of(one)) for one in files]
-    return ds.FileSystemDataset(fragments, schema, parquet, system)
-
-
-def _contents_of(file: DataFile) -> pc.Expression | None:
-    """What its name says of all its rows."""
-    if file.day is not None:
-        return pc.field("day") == pa.scalar(file.day, pa.date32())
-    if file.key is None:
-        return None
-    return (pc.field("content") == file.key.content) & (pc.field("recipe") == file.key.recipe)
-
-
 def _rows_of(table: pa.Table, columns: Sequence[str]) -> list[Row]:
     return list(zip(*(table[name].to_pylist() for name in columns)))
+
+
+def _key_words(rows: pa.Table) -> pa.ChunkedArray:
+    """Key of each row in one word."""
+    return pc.binary_join_element_wise(*(rows[name] for name in Key._fields), "/")

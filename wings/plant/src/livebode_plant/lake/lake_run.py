@@ -16,8 +16,7 @@ from livebode.core import Lines, MatrixResponses, PlantKinds, Responses
 from livebode.records import entry_missing, entry_named, entry_summary, is_matrix, kinds_in, lines_in, steady
 from livebode_plant.lake.data_file import Key
 from livebode_plant.lake.lake import Lake
-from livebode_plant.lake.wide_matrices import matrices_from_wide
-from livebode_plant.lake.wide_responses import from_wide
+from livebode_plant.lake.wide_responses import from_wide, matrices_from_wide
 
 _ROWS = 1 << 14
 
@@ -132,7 +131,7 @@ class LakeRun:
             yield from_wide(table.slice(start, _ROWS), self.summary["found"])
 
     def steady_batches(self) -> Iterator[Responses]:
-        """Those of a machine that was ready, without a transient at the start."""
+        """Batches of a machine that was ready, without a transient at the start."""
         return (steady(part, self.summary) for part in self.batches())
 
 

@@ -36,7 +36,7 @@ def query_lake(lake: Lake, sql: str, rows_max: int) -> QueryResult:
 
     def show(database: Any, asked: set[str]) -> None:
         for name in [name for name in TABLES if name in asked | {"runs"}]:
-            if (rows := lake.rows(name)) is not None:
+            if (rows := lake.lazy_rows(name)) is not None:
                 database.register(f"_{name}", rows)
                 complete = _COMPLETE if _is_of_results(name) else ""
                 database.execute(f"CREATE VIEW {name} AS SELECT _{name}.* FROM _{name}{complete}")

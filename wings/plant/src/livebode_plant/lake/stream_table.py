@@ -11,7 +11,7 @@ import pyarrow.compute as pc
 from livebode.core import LEVELS
 from livebode.locations import write_whole
 from livebode_plant.lake.data_file import DataFile, file_bytes, small_files
-from livebode_plant.lake.lake import Lake
+from livebode_plant.lake.lake import Change, Lake
 from livebode_plant.lake.schemas import TABLES
 
 _GROUP_ROWS = 1 << 16
@@ -63,12 +63,14 @@ class StreamTable:
         ArchiveError
             If the table cannot be written.
         """
-        with self._lake.reported(self.name):
-            self._lake.created(self.name)
-            while (at := self._position(stream)) < through:
-                positions = {stream: through, **(further or {})}
-                if self._lake.commit(self.name, list(self._written(rows(at))), positions=positions):
-                    return
+
+        def change() -> Change | None:
+            position = self._position(stream)
+            if position >= through:
+                return None
+            return Change(list(self._written(rows(position))), positions={stream: through, **(further or {})})
+
+        self._lake.append(self.name, change)
 
     def read(self, columns: list[str], where: pc.Expression, since: date) -> pa.Table:
         """Rows of the days since this one; those of earlier days are not read.
@@ -79,9 +81,9 @@ class StreamTable:
             If the table cannot be read.
         """
         with self._lake.reported(self.name):
-            found = (self._lake.file_rows(file, columns, where) for file in self._files(since=since))
+            parts = (self._lake.file_rows(file, columns, where) for file in self._files(since=since))
             return pa.concat_tables(
-                [self.schema.empty_table().select(columns), *(one for one in found if one is not None)]
+                [self.schema.empty_table().select(columns), *(part for part in parts if part is not None)]
             )
 
     def newest_first(self, columns: list[str], where: pc.Expression, since: date) -> Iterator[pa.Table]:
@@ -94,8 +96,8 @@ class StreamTable:
         """
         with self._lake.reported(self.name):
             for file in reversed(self._files(since=since)):
-                if (found := self._lake.file_rows(file, columns, where)) is not None:
-                    yield found
+                if (rows := self._lake.file_rows(file, columns, where)) is not None:
+                    yield rows
 
     def delete_before(self, day: date) -> int:
         """Remove the rows of earlier days, and return the number of their files."""
@@ -125,10 +127,11 @@ class StreamTable:
 
     def _files(self, since: date = date.min, before: date = date.max) -> list[DataFile]:
         """Files of some days, in the order of the days."""
-        if self._lake.opened(self.name) is None:
-            return []
-        files = self._lake.snapshot(self.name).files.values()
-        days = [(file.day, file) for file in files if file.day is not None and since <= file.day < before]
+        days = [
+            (file.day, file)
+            for file in self._lake.files(self.name)
+            if file.day is not None and since <= file.day < before
+        ]
         return [file for _, file in sorted(days, key=lambda one: (one[0], one[1].name))]
 
     def _written(self, rows: pa.Table) -> Iterator[DataFile]:

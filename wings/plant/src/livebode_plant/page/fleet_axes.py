@@ -111,14 +111,14 @@ class FleetAxes:
             if self._repeated(message):
                 continue
             try:
-                found = decode(message)
+                content = decode(message)
             except StatusError:
                 self.dropped += 1
                 continue
-            if isinstance(found, PartitionNames):
-                self._name(found)
+            if isinstance(content, PartitionNames):
+                self._name(content)
             else:
-                newest[found.partition] = found
+                newest[content.partition] = content
         known = [status for status in newest.values() if self._known(status)]
         if known:
             self._store(known, now_s)

@@ -1,34 +1,147 @@
-"""FleetBoard: the state of all axes of a fleet as a page shows it. It knows neither the network nor browsers."""
+"""FleetBoard: the state of all axes of a fleet as a page shows it, with its alarms; without network and browsers."""
 
 from __future__ import annotations
 
-import math
+import json
 from collections import OrderedDict
 from collections.abc import Sequence
-from typing import Any
+from dataclasses import asdict, dataclass
+from math import isfinite
+from typing import Any, get_args
 
 import numpy as np
 
 from livebode.core import ServerError
-from livebode.dashboard import Act, AlarmRequest
+from livebode.dashboard import MINUTES_MAX, NAME_MAX, TEXT_MAX, Act, AlarmRequest, AlarmShelf, AlarmState
 from livebode.language import Message
-from livebode_plant.fleet.status_message import BEHIND, NOT_READY, PRIORITIES, SILENT
-from livebode_plant.page import fleet_alarms as alarms
-from livebode_plant.page.fleet_alarms import CONDITIONS, FleetAct, FleetAlarms
+from livebode.monitoring import ALARMS
+from livebode_plant.fleet.status_message import ACTIVE, BEHIND, NOT_READY, PRIORITIES, SILENT
 from livebode_plant.page.fleet_axes import NOWHERE, FleetAxes
+
+CONDITIONS: tuple[AlarmState, ...] = (
+    "normal", "unacknowledged", "returned", "acknowledged", "suppressed", "shelved",
+)  # fmt: skip
+"""The states by their numbers in arrays."""
+NORMAL, UNACKNOWLEDGED, RETURNED, ACKNOWLEDGED, SUPPRESSED, SHELVED = range(len(CONDITIONS))
+ACT_BYTES_MAX = 4096
+_COUNT_MAX = 1 << 32
+Array = np.ndarray[Any, Any]
+
+
+@dataclass(frozen=True)
+class FleetAct:
+    """What a person did with the alarm of an axis: all pages of a fleet get it, and a new one the newest of each axis.
+
+    Attributes
+    ----------
+    act, path
+        What, and the axis.
+    raised, raised_s
+        How often the alarm had been raised, and when last, by the clock of its worker: those are acknowledged.
+    by, words
+        Person, and comment or reason.
+    until_s, at_s
+        End of the shelf, and when the person acted, seconds since 1970.
+    """
+
+    act: Act
+    path: str
+    raised: int
+    raised_s: int
+    by: str = ""
+    words: str = ""
+    until_s: float = 0.0
+    at_s: float = 0.0
+
+    def to_bytes(self) -> bytes:
+        """This act as JSON."""
+        return json.dumps(asdict(self), ensure_ascii=False).encode()
+
+    @classmethod
+    def of(cls, data: bytes) -> FleetAct | None:
+        """The act in these bytes; None if they are none."""
+        try:
+            if len(data) > ACT_BYTES_MAX:
+                return None
+            act = cls(**json.loads(data))
+        except (ValueError, TypeError, RecursionError):
+            return None
+        return act if act._valid() else None
+
+    def _valid(self) -> bool:
+        texts = ((self.path, ACT_BYTES_MAX), (self.by, NAME_MAX), (self.words, TEXT_MAX))
+        times = (self.until_s, self.at_s)
+        return (
+            self.act in get_args(Act)
+            and all(isinstance(text, str) and len(text) <= most and text.isprintable() for text, most in texts)
+            and all(type(n) is int and 0 <= n < _COUNT_MAX for n in (self.raised, self.raised_s))
+            and all(isinstance(t, int | float) and not isinstance(t, bool) and isfinite(t) for t in times)
+            and 0 <= self.until_s <= self.at_s + 60 * MINUTES_MAX + 1
+        )
+
+
+class FleetAlarms:
+    """Acknowledgements and shelves of axes by their rows."""
+
+    def __init__(self) -> None:
+        self.version = 0
+        self._seen = np.zeros(0, np.uint32)
+        self._seen_s = np.zeros(0, np.uint32)
+        self._until_s = np.zeros(0)
+        self._shelves: dict[int, AlarmShelf] = {}
+        self._acknowledged: dict[int, FleetAct] = {}
+
+    def apply(self, act: FleetAct, row: int) -> None:
+        """Take an act on the axis of a row."""
+        self._grow(row + 1)
+        self.version += 1
+        if act.act == "acknowledge":
+            self._seen[row], self._seen_s[row] = act.raised, act.raised_s
+            self._acknowledged[row] = act
+        elif act.act == "shelve":
+            self._until_s[row] = act.until_s
+            self._shelves[row] = AlarmShelf(act.by, act.until_s, act.words)
+        else:
+            self._until_s[row] = 0.0
+            self._shelves.pop(row, None)
+
+    def conditions(self, status: Array, kinds: list[str], now_s: float) -> Array:
+        """Number in `CONDITIONS` of each row, shape (rows,)."""
+        self._grow(len(status))
+        raised, active = status["raised"], (status["flags"] & ACTIVE) > 0
+        of_response = np.array([kind in ALARMS and ALARMS[kind].of_response for kind in kinds])[status["kind"]]
+        # An axis that begins again counts from zero: its next alarm must not pass for an acknowledged one.
+        new = (self._seen[: len(status)] < raised) | ((self._seen_s[: len(status)] < status["raised_s"]) & (raised > 0))
+        conditions = np.where(new, np.where(active, UNACKNOWLEDGED, RETURNED), np.where(active, ACKNOWLEDGED, NORMAL))
+        conditions[active & of_response & ((status["flags"] & NOT_READY) > 0)] = SUPPRESSED
+        conditions[(conditions != NORMAL) & (self._until_s[: len(status)] > now_s)] = SHELVED
+        return conditions.astype(np.uint8)
+
+    def plain(self, row: int, now_s: float) -> dict[str, Any]:
+        """Who acknowledged the alarm of a row, and its shelf, for the page."""
+        act, shelf = self._acknowledged.get(row), self._shelves.get(row)
+        found: dict[str, Any] = {"by": act.by, "comment": act.words} if act is not None else {"by": "", "comment": ""}
+        return found | {"shelf": shelf.plain() if shelf is not None and shelf.until_s > now_s else None}
+
+    def _grow(self, rows: int) -> None:
+        if rows > len(self._seen):
+            more = max(1024, rows, 2 * len(self._seen)) - len(self._seen)
+            self._seen = np.concatenate([self._seen, np.zeros(more, np.uint32)])
+            self._seen_s = np.concatenate([self._seen_s, np.zeros(more, np.uint32)])
+            self._until_s = np.concatenate([self._until_s, np.zeros(more)])
+
 
 LOOKS = (
     "open", "ok", "check", "alarm", "returned", "acknowledged", "shelved", "not ready", "silent", "behind", "lost",
 )  # fmt: skip
 """How a tile looks, by its number: 4 bits. Lost: its partition has no worker."""
-OPEN, OK, CHECK, ALARM, RETURNED, ACKNOWLEDGED, SHELVED, NOT_READY_LOOK, SILENT_LOOK, BEHIND_LOOK, LOST = range(11)
+ALARM, RETURNED_LOOK, ACKNOWLEDGED_LOOK, SHELVED_LOOK, NOT_READY_LOOK, SILENT_LOOK, BEHIND_LOOK, LOST = range(3, 11)
 _SEVERITY = np.array([1, 0, 6, 10, 7, 5, 2, 3, 9, 8, 4], float)
 # A worker that is lost would fill the list of the worst axes with all of its axes; it is in the list of workers.
 LOST_S = 5.0
 """A partition whose status is older than this has no worker."""
 WORST, ALARMS_MAX, PARTITIONS_MAX = 50, 300, 100
 _ACTS_MAX = 1 << 18
-Array = np.ndarray[Any, Any]
 
 
 class FleetBoard:
@@ -78,17 +191,17 @@ class FleetBoard:
     def refresh(self, now_s: float) -> None:
         """Compute the looks of this moment."""
         status = self.axes.status
-        self._conditions = found = self.alarms.conditions(status, self.axes.kinds, now_s)
+        self._conditions = conditions = self.alarms.conditions(status, self.axes.kinds, now_s)
         flags = status["flags"]
         looks = status["state"].copy()
         for which, look in (
             ((flags & NOT_READY) > 0, NOT_READY_LOOK),
-            (found == alarms.SHELVED, SHELVED),
-            (found == alarms.ACKNOWLEDGED, ACKNOWLEDGED),
+            (conditions == SHELVED, SHELVED_LOOK),
+            (conditions == ACKNOWLEDGED, ACKNOWLEDGED_LOOK),
             ((flags & BEHIND) > 0, BEHIND_LOOK),
             ((flags & SILENT) > 0, SILENT_LOOK),
-            (found == alarms.RETURNED, RETURNED),
-            (found == alarms.UNACKNOWLEDGED, ALARM),
+            (conditions == RETURNED, RETURNED_LOOK),
+            (conditions == UNACKNOWLEDGED, ALARM),
         ):
             looks[which] = look
         lost = [n for n, partition in self.axes.partitions.items() if not now_s - partition.heard_s < LOST_S]
@@ -111,13 +224,13 @@ class FleetBoard:
         score = 1e6 * _SEVERITY[self._looks] + 1e5 * status["priority"]
         score += np.minimum(np.nan_to_num(np.abs(status["change_percent"])), 1e4)
         score += 1e-5 * np.minimum(status["lag_s"], 1e4)
-        found = _largest(score, WORST)
-        return [self._plain(int(row)) for row in found if _SEVERITY[self._looks[row]] > 1]
+        rows = _largest(score, WORST)
+        return [self._plain(int(row)) for row in rows if _SEVERITY[self._looks[row]] > 1]
 
     def open_alarms(self, now_s: float) -> dict[str, Any]:
         """Alarms that are not normal, the most urgent first, at most 300, and how many there are."""
         conditions = self._conditions
-        some = np.flatnonzero(conditions != alarms.NORMAL)
+        some = np.flatnonzero(conditions != NORMAL)
         rank = np.array([9, 0, 1, 2, 3, 4])[conditions[some]]
         status = self.axes.status[some]
         order = np.lexsort((-status["raised_s"].astype(float), -status["priority"].astype(int), rank))
@@ -127,14 +240,14 @@ class FleetBoard:
     @property
     def open_count(self) -> int:
         """Number of alarms that are not acknowledged."""
-        found = self._conditions
-        return int(np.count_nonzero((found == alarms.UNACKNOWLEDGED) | (found == alarms.RETURNED)))
+        conditions = self._conditions
+        return int(np.count_nonzero((conditions == UNACKNOWLEDGED) | (conditions == RETURNED)))
 
     def gaps(self) -> dict[str, Any]:
         """The 50 axes that lost most samples, and the sums of the fleet."""
         status = self.axes.status
-        found = _largest(status["lost"].astype(float) + 1e-3 * np.minimum(status["gaps"], 100), WORST)
-        rows = [self._plain(int(row)) for row in found if status["gaps"][row] or status["lost"][row]]
+        worst = _largest(status["lost"].astype(float) + 1e-3 * np.minimum(status["gaps"], 100), WORST)
+        rows = [self._plain(int(row)) for row in worst if status["gaps"][row] or status["lost"][row]]
         return {
             "rows": rows,
             "axes": int(np.count_nonzero(status["gaps"])),
@@ -144,7 +257,7 @@ class FleetBoard:
 
     def workers(self, now_s: float) -> dict[str, Any]:
         """Each worker with the sums and the worst of its partitions, the latest first; and partitions without one."""
-        found: dict[str, dict[str, Any]] = {}
+        workers: dict[str, dict[str, Any]] = {}
         silent: list[dict[str, Any]] = []
         for number, partition in sorted(self.axes.partitions.items()):
             age_s = now_s - partition.heard_s
@@ -153,19 +266,19 @@ class FleetBoard:
                 silent.append({"partition": number, "axes": len(partition.rows), "age_s": _number(age_s)})
                 continue
             name = "" if names is None else names.worker
-            one = found.setdefault(
+            worker = workers.setdefault(
                 name, {"worker": name, "partitions": 0, "axes": 0, "waiting": 0, "lag_s": 0.0, "age_s": 0.0}
             )
-            one["partitions"] += 1
-            one["axes"] += len(partition.rows)
-            one["waiting"] += partition.waiting
-            one["lag_s"] = max(one["lag_s"], _number(partition.lag_s))
-            one["age_s"] = max(one["age_s"], _number(age_s))
-        rows = sorted(found.values(), key=lambda one: (-one["lag_s"], -one["waiting"], one["worker"]))
+            worker["partitions"] += 1
+            worker["axes"] += len(partition.rows)
+            worker["waiting"] += partition.waiting
+            worker["lag_s"] = max(worker["lag_s"], _number(partition.lag_s))
+            worker["age_s"] = max(worker["age_s"], _number(age_s))
+        rows = sorted(workers.values(), key=lambda worker: (-worker["lag_s"], -worker["waiting"], worker["worker"]))
         return {
             "rows": rows[:PARTITIONS_MAX], "count": len(rows), "partitions": len(self.axes.partitions),
             "silent": silent[:PARTITIONS_MAX], "silent_count": len(silent),
-            "waiting": sum(one["waiting"] for one in rows), "dropped": self.axes.dropped,
+            "waiting": sum(worker["waiting"] for worker in rows), "dropped": self.axes.dropped,
         }  # fmt: skip
 
     def axis(self, number: int, now_s: float) -> dict[str, Any] | None:
@@ -207,9 +320,9 @@ class FleetBoard:
     def _plain(self, row: int) -> dict[str, Any]:
         status = self.axes.status[row]
         numbers = ("effective_s", "lag_s", "value", "bound", "change_percent")
-        found: dict[str, Any] = {name: _number(float(status[name])) for name in numbers}
-        found |= {name: int(status[name]) for name in ("lost", "gaps", "raised", "raised_s")}
-        return found | {
+        plain: dict[str, Any] = {name: _number(float(status[name])) for name in numbers}
+        plain |= {name: int(status[name]) for name in ("lost", "gaps", "raised", "raised_s")}
+        return plain | {
             "axis": int(self.axes.place[row]),
             "look": int(self._looks[row]),
             "parameter": self.axes.names[row].parameter,
@@ -226,7 +339,7 @@ def _largest(score: Array, count: int) -> Array:
 
 
 def _number(value: float) -> float | None:
-    """For JSON, with the digits that a person reads."""
-    if not math.isfinite(value):
+    """A number for JSON, with the digits that a person reads."""
+    if not isfinite(value):
         return None
     return round(value, 3) if abs(value) > 1e6 else float(f"{value:.6g}")

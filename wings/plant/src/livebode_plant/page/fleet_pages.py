@@ -14,13 +14,16 @@ Numbers are little endian.
 
 from __future__ import annotations
 
+import asyncio
 import gzip
 import struct
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections import deque
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, cast, get_args
+from typing import Any, Literal, cast, get_args
 
 import numpy as np
 from starlette.requests import Request
@@ -28,12 +31,14 @@ from starlette.responses import JSONResponse, RedirectResponse, Response
 from starlette.routing import BaseRoute, Route, WebSocketRoute
 from starlette.websockets import WebSocket
 
-from livebode.core import ServerError
+from livebode.core import LivebodeError, ServerError
 from livebode.dashboard import (
     Act,
+    AlarmRequest,
     Board,
     BrowserSocket,
     Order,
+    Pulse,
     Role,
     alarm_request,
     error_answer,
@@ -42,13 +47,81 @@ from livebode.dashboard import (
 )
 from livebode.language import Message
 from livebode.records import to_json
-from livebode_plant.page.fleet_view import FleetView
+from livebode_plant.page.fleet_board import FleetBoard
+from livebode_plant.page.fleet_feed import StatusFeed
 
-if TYPE_CHECKING:
-    from starlette.responses import Response
-    from starlette.routing import BaseRoute
+TICK_S, IDLE_S = 0.25, 1.0
+"""Between two updates of the board, with and without browsers."""
+RETRY_S = 2.0
+_WAITING_MAX = 1 << 14
 
-    from livebode.dashboard import Board
+
+@dataclass
+class FleetView:
+    """What `livebode fleet status --serve` shows: passes the messages of a feed to the board, and wakes the browsers.
+
+    Attributes
+    ----------
+    feed
+        Source of the messages.
+    plan
+        SVG of a floor plan; None without one.
+    trends
+        Address of a page of trends, to which "#axis=PATH" is appended; empty without one.
+    lake
+        Directory or URL of the lake with the results of the fleet; empty without one.
+    """
+
+    feed: StatusFeed
+    plan: str | None = None
+    trends: str = ""
+    lake: str = ""
+    board: FleetBoard = field(default_factory=FleetBoard)
+    pulse: Pulse = field(default_factory=Pulse)
+    browsers: int = 0
+    _messages: deque[bytes] = field(default_factory=lambda: deque(maxlen=_WAITING_MAX))
+    _acts: deque[bytes] = field(default_factory=deque)
+
+    @property
+    def static(self) -> Path:
+        """Directory of the files of the page."""
+        return Path(__file__).parent / "static"
+
+    def routes(self, board: Board, file: Callable[[str], Response], order: Order) -> list[BaseRoute]:
+        """Routes of the page."""
+        return FleetPages(self, board, file, order).routes
+
+    async def run(self) -> None:
+        """Follow the feed until it is cancelled."""
+        following = asyncio.create_task(self._follow())
+        try:
+            while not following.done():
+                self._tick()
+                await asyncio.wait([following], timeout=TICK_S if self.browsers else IDLE_S)
+            following.result()
+        finally:
+            following.cancel()
+
+    async def act(self, act: Act, asked: AlarmRequest) -> None:
+        """Do what a person asks for; LivebodeError if it is impossible."""
+        await self.feed.publish(self.board.act(act, asked, time.time()))
+
+    async def _follow(self) -> None:
+        while True:
+            try:
+                await self.feed.run(self._messages.append, self._acts.append)
+            except LivebodeError as error:
+                self.feed.trouble = str(error)
+            await asyncio.sleep(RETRY_S)
+
+    def _tick(self) -> None:
+        now_s, board = time.time(), self.board
+        messages = [self._messages.popleft() for _ in range(len(self._messages))]
+        board.process(messages, now_s)
+        while self._acts:
+            board.process_act(self._acts.popleft())
+        board.refresh(now_s)
+        self.pulse.beat()
 
 
 _HEADER = struct.Struct("<4sBBxxII")
@@ -150,20 +223,17 @@ class FleetClient(BrowserSocket):
 
     async def _send_lists(self) -> None:
         board, now_s = self._view.board, time.time()
-        name = self._watched.list
-        found: dict[str, Any] = {"trouble": self._view.feed.trouble, "layout": board.layout}
-        found["open"] = board.open_count
-        if name == "worst":
-            found["worst"] = board.worst()
-        elif name == "alarms":
-            found["alarms"] = board.open_alarms(now_s)
-        elif name == "gaps":
-            found["gaps"] = board.gaps()
-        else:
-            found["workers"] = board.workers(now_s)
+        rows: dict[ListName, Callable[[], Any]] = {
+            "worst": board.worst,
+            "alarms": lambda: board.open_alarms(now_s),
+            "gaps": board.gaps,
+            "workers": lambda: board.workers(now_s),
+        }
+        state: dict[str, Any] = {"trouble": self._view.feed.trouble, "layout": board.layout, "open": board.open_count}
+        state[self._watched.list] = rows[self._watched.list]()
         if self._watched.axis is not None:
-            found["axis"] = board.axis(self._watched.axis, now_s)
-        news = {key: value for key, value in found.items() if self._sent.get(key) != value or key == "layout"}
+            state["axis"] = board.axis(self._watched.axis, now_s)
+        news = {key: value for key, value in state.items() if self._sent.get(key) != value or key == "layout"}
         self._sent |= news
         if len(news) > 1:
             await self.send(news)
@@ -204,62 +274,50 @@ class FleetPages:
 
     @property
     def routes(self) -> list[BaseRoute]:
-        """All of them."""
+        """Routes of the page."""
+        answers = {"axes": self.axes, "plan": self.plan, "trend": self.trend}
         return [
             Route("/", self.page),
-            Route("/api/axes", self.axes),
-            Route("/api/plan", self.plan),
-            Route("/api/trend", self.trend),
-            Route("/api/acknowledge", self.acknowledge, methods=["POST"]),
-            Route("/api/shelve", self.shelve, methods=["POST"]),
-            Route("/api/unshelve", self.unshelve, methods=["POST"]),
+            *(Route(f"/api/{name}", partial(self._known, answer)) for name, answer in answers.items()),
+            *(Route(f"/api/{act}", partial(self._act, act), methods=["POST"]) for act in get_args(Act)),
             WebSocketRoute("/live", self.live),
         ]
+
+    async def _known(self, answer: Callable[[Request], Awaitable[Response]], request: Request) -> Response:
+        """The answer to somebody who has logged in."""
+        if self._role(request) is None:
+            return JSONResponse(error_answer(Message("log in first")), 401)
+        return await answer(request)
 
     async def page(self, request: Request) -> Response:
         return RedirectResponse("/login", 303) if self._role(request) is None else self._file("fleet.html")
 
-    async def axes(self, request: Request) -> Response:
+    async def axes(self, _: Request) -> Response:
         """Path of each axis in a line, in order; the layout is in a header."""
-        if self._role(request) is None:
-            return _unknown()
         board = self._view.board
         if self._paths[0] != board.layout:
             self._paths = board.layout, gzip.compress("\n".join(board.paths).encode(), 1)
         headers = {"content-encoding": "gzip", "x-layout": str(board.layout)}
         return Response(self._paths[1], media_type="text/plain; charset=utf-8", headers=headers)
 
-    async def plan(self, request: Request) -> Response:
+    async def plan(self, _: Request) -> Response:
         """The floor plan."""
-        if self._role(request) is None:
-            return _unknown()
         if self._view.plan is None:
             return JSONResponse({"error": "there is no floor plan"}, 404)
         return Response(self._view.plan, media_type="image/svg+xml")
 
     async def trend(self, request: Request) -> Response:
         """A quantity of an axis of this fleet over the last year."""
-        if self._role(request) is None:
-            return _unknown()
         path, axes = request.query_params.get("axis", ""), self._view.board.axes
         if (row := axes.row(path)) is None:
             raise ServerError("request-malformed", "the fleet has no such axis", Message("reload the page"))
         asked = path, request.query_params.get("quantity", ""), axes.names[row].parameter
         return Response(to_json(await self._board.elsewhere(self._trends.plain, *asked)), media_type="application/json")
 
-    async def acknowledge(self, request: Request) -> Response:
-        return await self._act(request, "acknowledge")
-
-    async def shelve(self, request: Request) -> Response:
-        return await self._act(request, "shelve")
-
-    async def unshelve(self, request: Request) -> Response:
-        return await self._act(request, "unshelve")
-
     async def live(self, socket: WebSocket) -> None:
         await serve_browser(self._board, socket, lambda role: FleetClient(self._view, socket, role))
 
-    async def _act(self, request: Request, act: Act) -> Response:
+    async def _act(self, act: Act, request: Request) -> Response:
         data = await self._order(request)
         if isinstance(data, Response):
             return data
@@ -272,29 +330,3 @@ class FleetPages:
     def _role(self, request: Request) -> Role | None:
         headers, address = request.headers, request.client.host if request.client else ""
         return self._board.access.role(headers.get("cookie", ""), headers.get("authorization", ""), address)
-
-
-def _unknown() -> Response:
-    return JSONResponse(error_answer(Message("log in first")), 401)
-
-
-@dataclass(frozen=True)
-class FleetSite:
-    """A fleet for `Dashboard.show`; it can be made without the packages of the dashboard."""
-
-    view: FleetView
-
-    @property
-    def static(self) -> Path:
-        """Directory of the files of the page."""
-        return Path(__file__).parent / "static"
-
-    def routes(self, board: Board, file: Callable[[str], Response], order: Order) -> list[BaseRoute]:
-        """The routes of the page."""
-        from livebode_plant.page.fleet_pages import FleetPages
-
-        return FleetPages(self.view, board, file, order).routes
-
-    async def run(self) -> None:
-        """Follow the fleet until it is cancelled."""
-        await self.view.run()

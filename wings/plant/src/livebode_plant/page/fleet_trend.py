@@ -107,8 +107,8 @@ class QuantityYear:
 
         days = self.joined(_DAY_S)
         own = ~days.others
-        found = trend_of(days.at[own], days.value[own], days.bound_95[own])
-        return (found if isinstance(found, Trend) else None), int(own.sum())
+        trend = trend_of(days.at[own], days.value[own], days.bound_95[own])
+        return (trend if isinstance(trend, Trend) else None), int(own.sum())
 
 
 @dataclass(eq=False)
@@ -134,8 +134,8 @@ class AxisYear:
             return {"state": "no values", "stopped": self.stopped, "damaged": self.damaged}
         from livebode_plant.trending import RUNS_MIN
 
-        names = sorted(self.quantities, key=lambda one: _rank(one, main))[:QUANTITIES_MAX]
-        chosen = next((one for one in names if f"{one.model}:{one.name}" == wanted), None) if wanted else names[0]
+        names = sorted(self.quantities, key=lambda name: _rank(name, main))[:QUANTITIES_MAX]
+        chosen = next((name for name in names if f"{name.model}:{name.name}" == wanted), None) if wanted else names[0]
         if chosen is None:
             raise ServerError(
                 "request-malformed", "the lake has no such quantity of this axis", Message("reload the page")
@@ -204,8 +204,8 @@ class AxisTrends:
         rows = pa.concat_tables(parts)
         rows = rows.filter(pc.and_(pc.is_finite(rows["value"]), pc.is_finite(rows["bound_95"])))
         names = rows.group_by(list(QuantityName._fields)).aggregate([]).to_pylist()
-        found = {QuantityName(**one): QuantityYear.of(rows.filter(_alike(one))) for one in names}
-        return AxisYear(found, reading.stopped, self._lake.damaged)
+        quantities = {QuantityName(**name): QuantityYear.of(rows.filter(_alike(name))) for name in names}
+        return AxisYear(quantities, reading.stopped, self._lake.damaged)
 
 
 @dataclass
@@ -232,25 +232,21 @@ class _Reading:
 
 def _runs(lake: Lake, where: pc.Expression, since: datetime) -> pa.Table:
     """The runs of an archive in the same lake that count."""
-    key = ["content", "recipe"]
-    counted = {tuple(row.values()) for row in lake.read("runs", key, where).to_pylist()}
     later = where & (pc.field("recorded_from") >= pa.scalar(since, pa.timestamp("us", tz="UTC")))
-    found = lake.read("quantities", [*_OF_FITS, "content", "recorded_from"], later)
-    keys = zip(*(found[name].to_pylist() for name in key))
-    return _dated(found.filter(pa.array([one in counted for one in keys], pa.bool_())), "recorded_from")
+    return _dated(lake.counted("quantities", [*_OF_FITS, "content", "recorded_from"], later, where), "recorded_from")
 
 
 def _dated(rows: pa.Table, column: str) -> pa.Table:
     """The columns of fits, and the time in seconds since 1970."""
-    at = pc.divide(rows[column].cast(pa.int64()).cast(pa.float64()), 1e6)
-    return rows.select(_OF_FITS).append_column("at", at)
+    time_s = pc.divide(rows[column].cast(pa.int64()).cast(pa.float64()), 1e6)
+    return rows.select(_OF_FITS).append_column("at", time_s)
 
 
 def _rows_of(axis: str) -> pc.Expression:
     """The rows of the axis with this path, in which levels without a name are left out."""
     names = axis.split("/")
-    found = [dict(zip(some, names)) for some in combinations(LEVELS, len(names))]
-    return reduce(or_, (reduce(and_, (_named(level, one.get(level)) for level in LEVELS)) for one in found), _NONE)
+    places = [dict(zip(some, names)) for some in combinations(LEVELS, len(names))]
+    return reduce(or_, (reduce(and_, (_named(level, place.get(level)) for level in LEVELS)) for place in places), _NONE)
 
 
 _NONE = pc.scalar(False)
@@ -260,8 +256,8 @@ def _named(level: str, name: str | None) -> pc.Expression:
     return pc.field(level).is_null() if name is None else pc.field(level) == name
 
 
-def _alike(one: dict[str, str]) -> pc.Expression:
-    return reduce(and_, (pc.field(name) == text for name, text in one.items()))
+def _alike(name: dict[str, str]) -> pc.Expression:
+    return reduce(and_, (pc.field(name) == text for name, text in name.items()))
 
 
 def _rank(one: QuantityName, main: str) -> tuple[bool, bool, bool, str, str]:

@@ -84,7 +84,7 @@ def _copied(source: ET.Element, counted: list[int], depth: int) -> ET.Element:
     for child in source:
         name = child.tag.rpartition("}")[2] if isinstance(child.tag, str) else ""
         if name in _IGNORED or not name:
-            if name == "defs" and any(one.tag.rpartition("}")[2] in ("script", "style") for one in child.iter()):
+            if name == "defs" and any(part.tag.rpartition("}")[2] in ("script", "style") for part in child.iter()):
                 raise ValueError("it contains <style> or <script>")
             continue
         if name not in _SHAPES or not child.tag.startswith(_SVG):
@@ -95,26 +95,26 @@ def _copied(source: ET.Element, counted: list[int], depth: int) -> ET.Element:
 
 def _attributes(element: ET.Element) -> list[tuple[str, str]]:
     """Attributes that are allowed; those of a style become attributes, since the page allows no inline styles."""
-    found = []
+    attributes = []
     for name, value in element.attrib.items():
         local = name.rpartition("}")[2]
         if local.lower().startswith("on") or local == "href":
             raise ValueError(f"it contains the attribute {local}")
         if name == "style":
             pairs = (part.partition(":")[::2] for part in value.split(";"))
-            found += [(key.strip(), word.strip()) for key, word in pairs if key.strip() in _PRESENTATION]
+            attributes += [(key.strip(), word.strip()) for key, word in pairs if key.strip() in _PRESENTATION]
         elif name in _ATTRIBUTES:
-            found.append((name, value))
-    for name, value in found:
+            attributes.append((name, value))
+    for name, value in attributes:
         if name not in ("id", "data-axis") and _UNSAFE.search(value):
             raise ValueError(f"its attribute {name} refers to something else")
-    return found
+    return attributes
 
 
 def _length(text: str | None) -> float | None:
-    found = re.fullmatch(r"\s*([0-9.]+(?:e[+-]?\d+)?)\s*(?:px|mm|cm|in|pt)?\s*", text or "")
+    match = re.fullmatch(r"\s*([0-9.]+(?:e[+-]?\d+)?)\s*(?:px|mm|cm|in|pt)?\s*", text or "")
     try:
-        return float(found[1]) if found else None
+        return float(match[1]) if match else None
     except ValueError:
         return None
 

@@ -12,6 +12,7 @@ from livebode.language import listed, number, tr, trn, worded
 from livebode_plant.report.trend_words import (
     amount,
     change_words,
+    day,
     months,
     outlook,
     quantity_name,
@@ -19,7 +20,6 @@ from livebode_plant.report.trend_words import (
     sentence,
     year_of,
 )
-from livebode_plant.report.year import day
 from livebode_plant.trending import LIMIT_PERCENT, Assessment, History, Ranked, urgency
 
 _SENTENCES, _PICTURES, _ROWS = 12, 6, 40
@@ -64,7 +64,7 @@ class Hall:
     @property
     def changed(self) -> list[tuple[Ranked, History]]:
         """Significant changes of all quantities, the worst first."""
-        every = [(one, of.history) for of in self.assessments for one in of.ranked if one.significant]
+        every = [(ranked, of.history) for of in self.assessments for ranked in of.ranked if ranked.significant]
         return sorted(every, key=lambda pair: urgency(pair[0]))
 
     @property
@@ -85,22 +85,24 @@ class Hall:
         return {axis: last for axis, (_, _, last) in self.axes.items() if axis in common}
 
     def plain(self) -> dict[str, Any]:
-        """For JSON."""
+        """Plain data for JSON."""
         return {
             "axes": len(self.axes),
             "runs": sum(runs for runs, _, _ in self.axes.values()),
             "quarantined": len(self.quarantined),
             "changed": [
                 {
-                    "axis": one.machine,
+                    "axis": each.machine,
                     "quantity": history.name,
-                    "sentence": sentence(one, history.name, history.unit_of(one.machine)),
+                    "sentence": sentence(each, history.name, history.unit_of(each.machine)),
                 }
-                for one, history in self.changed
+                for each, history in self.changed
             ],
             "silent": {axis: day(last) for axis, last in self.silent.items()},
             "runs_with_alarms": self.alarming,
-            "alarms": [{"axis": one.axis, "recorded": _recorded(one), "message": one.message} for one in self.alarms],
+            "alarms": [
+                {"axis": alarm.axis, "recorded": _recorded(alarm), "message": alarm.message} for alarm in self.alarms
+            ],
         }
 
     def document(self, made: datetime) -> Document:
@@ -122,7 +124,7 @@ class Hall:
         axes = self.axes
         span = "—"
         if axes:
-            first, last = min(f for _, f, _ in axes.values()), max(at for _, _, at in axes.values())
+            first, last = min(first_s for _, first_s, _ in axes.values()), max(last_s for _, _, last_s in axes.values())
             span = f"{day(first)} … {day(last)}"
         return (
             (tr("recorded"), span),
@@ -134,8 +136,8 @@ class Hall:
         )
 
     def _result(self) -> Finding:
-        changed = {one.machine for one, _ in self.changed}
-        assessed = {one.machine for of in self.assessments for one in of.ranked}
+        changed = {ranked.machine for ranked, _ in self.changed}
+        assessed = {ranked.machine for of in self.assessments for ranked in of.ranked}
         if not assessed:
             return Finding("open", tr("No axis has enough runs for a trend."))
         if not changed:
@@ -145,7 +147,7 @@ class Hall:
             "{n:,} of {of:,} axes changed significantly.", "{n:,} of {of:,} axes changed significantly.", len(changed),
             of=len(assessed),
         )  # fmt: skip
-        return Finding(max((self._tone(one) for one, _ in self.changed), key=("check", "alarm").index), text)
+        return Finding(max((self._tone(ranked) for ranked, _ in self.changed), key=("check", "alarm").index), text)
 
     def _tone(self, one: Ranked) -> Tone:
         return "alarm" if one.months == 0 else "check"
@@ -163,7 +165,7 @@ class Hall:
 
     def _alarm_finding(self) -> Iterator[Finding]:
         if self.alarms:
-            axes = listed(sorted({one.axis for one in self.alarms}))
+            axes = listed(sorted({alarm.axis for alarm in self.alarms}))
             text = trn(
                 "{n:,} run has an alarm against the baseline of its machine: {axes}.",
                 "{n:,} runs have an alarm against the baseline of their machine: {axes}.",
@@ -175,7 +177,7 @@ class Hall:
     def _alarm_list(self) -> Section | None:
         if not self.alarms:
             return None
-        rows = tuple((one.axis, _recorded(one) or "—", worded(one.message)) for one in self.alarms[:_ROWS])
+        rows = tuple((alarm.axis, _recorded(alarm) or "—", worded(alarm.message)) for alarm in self.alarms[:_ROWS])
         note = tr("The newest runs first. Each was compared with the baseline of its machine.")
         return Section(tr("Alarms"), (PrintedTable((tr("axis"), tr("recorded"), tr("alarm")), rows, (), note),))
 
@@ -196,7 +198,7 @@ class Hall:
             "The first of the changes: each run with its bound, without the influence of the covariates; the trend "
             "with its 95 % bound; jumps and other slopes."
         )
-        return Picture("livebode_plant.report.year:years_figure", {"years": years}, caption) if years else None
+        return Picture("livebode_plant.report.trend_words:years_figure", {"years": years}, caption) if years else None
 
     def _row(self, one: Ranked, history: History) -> tuple[str, ...]:
         trend, unit = one.trend, history.unit_of(one.machine)

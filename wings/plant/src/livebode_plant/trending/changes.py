@@ -29,7 +29,7 @@ class Break:
     time: float
 
     def term(self, time: Floats) -> Floats:
-        """Its column of the regression: one step, or a slope of one, from that time on."""
+        """Column of the change in the regression: one step, or a slope of one, from that time on."""
         after = time >= self.time
         return np.where(after, 1.0 if self.kind == "jump" else time - self.time, 0.0)
 
@@ -127,15 +127,15 @@ def _best(times: list[float], time: Floats, columns: Floats, fit: RobustFit) -> 
     left = np.clip(fit.residual, -limit, limit)
     q = np.linalg.qr(columns)[0]
     left = left - q @ (q.T @ left)
-    found = []
+    breaks = []
     for kind in _KINDS:
-        terms = np.column_stack([Break(kind, at).term(time) for at in times])
+        terms = np.column_stack([Break(kind, time_of_change).term(time) for time_of_change in times])
         terms = terms - q @ (q.T @ terms)
         size = np.linalg.norm(terms, axis=0)
         own = size > 1e-6 * size.max()
         gain = np.abs(terms.T @ left)
-        found.append(Break(kind, times[int(np.argmax(np.where(own, gain / np.where(own, size, 1.0), 0.0)))]))
-    return found
+        breaks.append(Break(kind, times[int(np.argmax(np.where(own, gain / np.where(own, size, 1.0), 0.0)))]))
+    return breaks
 
 
 _Tried = tuple[Break, Floats, RobustFit]

@@ -156,34 +156,34 @@ def history(lake: Lake, quantity: str, of: Selection) -> History:
         If there is no such quantity, several have the name, no run has the recipe or a covariate, or the lake cannot
         be read.
     """
-    found = lake.read("quantities", _COLUMNS, where_of(of) & (pc.field("name") == quantity))
-    models = pc.unique(found["model"]).to_pylist()
+    rows = lake.counted("quantities", _COLUMNS, where_of(of) & (pc.field("name") == quantity))
+    models = pc.unique(rows["model"]).to_pylist()
     model, name = (models[0], quantity) if len(models) == 1 else _resolved(lake, quantity)
     if name != quantity or not models:
         of_it = (pc.field("name") == name) & (pc.field("model") == model)
-        found = lake.read("quantities", _COLUMNS, where_of(of) & of_it)
-    return _history(_counted(lake, found), of, model, name)
+        rows = lake.counted("quantities", _COLUMNS, where_of(of) & of_it)
+    return _history(rows, of, model, name)
 
 
 def histories(lake: Lake, of: Selection) -> list[History]:
     """All quantities of the runs that count, in the order of models and names."""
-    found = _counted(lake, lake.read("quantities", _COLUMNS, where_of(of)))
-    own = found if of.recipe is None else recipe_of_each(found, of.recipe)[0]
+    rows = lake.counted("quantities", _COLUMNS, where_of(of))
+    own = rows if of.recipe is None else recipe_of_each(rows, of.recipe)[0]
     return [
-        _history(found.filter((pc.field("model") == model) & (pc.field("name") == name)), of, model, name)
+        _history(rows.filter((pc.field("model") == model) & (pc.field("name") == name)), of, model, name)
         for model, name in _quantities(own)
     ]
 
 
-def _history(found: pa.Table, of: Selection, model: str, name: str) -> History:
-    found, recipe, others = recipe_of_each(found, of.recipe)
-    path = found["axis path"]
+def _history(rows: pa.Table, of: Selection, model: str, name: str) -> History:
+    rows, recipe, others = recipe_of_each(rows, of.recipe)
+    path = rows["axis path"]
     if of.below:
-        found = found.filter(pc.or_(pc.equal(path, of.below), pc.starts_with(path, of.below + "/")))
-    dated = found.filter(pc.field("recorded_from").is_valid()).sort_by([("recorded_from", "ascending"), *_ascending()])
-    units = pc.unique(found["unit"]).to_pylist()
+        rows = rows.filter(pc.or_(pc.equal(path, of.below), pc.starts_with(path, of.below + "/")))
+    dated = rows.filter(pc.field("recorded_from").is_valid()).sort_by([("recorded_from", "ascending"), *_ascending()])
+    units = pc.unique(rows["unit"]).to_pylist()
     return History(
-        model, name, units[0] if units else "", dict(_machines(dated, of)), found.num_rows - dated.num_rows, recipe,
+        model, name, units[0] if units else "", dict(_machines(dated, of)), rows.num_rows - dated.num_rows, recipe,
         others,
     )  # fmt: skip
 
@@ -241,15 +241,6 @@ def _path(rows: pa.Table, levels: Sequence[str]) -> pa.Array:
     return pc.if_else(pc.equal(path, ""), UNNAMED, path)
 
 
-def _counted(lake: Lake, rows: pa.Table) -> pa.Table:
-    """Those of results with a row in `runs`."""
-    return rows.filter(pc.is_in(_joined(rows), value_set=_joined(lake.read("runs", _KEY)).combine_chunks()))
-
-
-def _joined(rows: pa.Table) -> pa.ChunkedArray:
-    return pc.binary_join_element_wise(rows["content"], rows["recipe"], "/")
-
-
 def recipe_of_each(rows: pa.Table, recipe: str | None) -> tuple[pa.Table, str, int]:
     """For each axis the rows with this recipe, or with that of its most rows; the most frequent id, and the number of
     other rows. The rows have a column "axis path" then."""
@@ -265,10 +256,10 @@ def recipe_of_each(rows: pa.Table, recipe: str | None) -> tuple[pa.Table, str, i
                 recipe=recipe,
             )
     counts = named.group_by(["axis path", "recipe"]).aggregate([([], "count_all")]).to_pylist()
-    counts.sort(key=lambda one: (-one["count_all"], one["recipe"]))
+    counts.sort(key=lambda count: (-count["count_all"], count["recipe"]))
     of_axis: dict[str, str] = {}
-    for one in counts:
-        of_axis.setdefault(one["axis path"], one["recipe"])
+    for count in counts:
+        of_axis.setdefault(count["axis path"], count["recipe"])
     chosen = pa.array([f"{path}/{own}" for path, own in of_axis.items()], pa.string())
     own = pc.binary_join_element_wise(named["axis path"], named["recipe"], "/")
     kept = named.filter(pc.is_in(own, value_set=chosen))
@@ -297,14 +288,14 @@ def _resolved(lake: Lake, quantity: str) -> tuple[str, str]:
     known = _quantities(lake.read("quantities", ["model", "name"]))
     for same in (str, str.casefold):
         wanted = same(quantity)
-        found = [(m, n) for m, n in known if wanted in (same(n), same(f"{m}:{n}"))]
-        if len(found) == 1:
-            return found[0]
-        if found:
+        matches = [(m, n) for m, n in known if wanted in (same(n), same(f"{m}:{n}"))]
+        if len(matches) == 1:
+            return matches[0]
+        if matches:
             raise ArchiveError(
                 "quantity-ambiguous",
-                f"{len(found)} quantities have the name {quantity!r}",
-                f"choose one: {', '.join(f'{m}:{n}' for m, n in found)}",
+                f"{len(matches)} quantities have the name {quantity!r}",
+                f"choose one: {', '.join(f'{m}:{n}' for m, n in matches)}",
                 quantity=quantity,
             )
     raise ArchiveError(

@@ -46,7 +46,7 @@ class CorrelatedScatter:
 
     @classmethod
     def of(cls, q: Floats, error: Floats) -> CorrelatedScatter:
-        """From the errors of rows in the order of time, (rows,), and orthonormal terms, (rows, terms).
+        """Scatter from the errors of rows in the order of time, (rows,), and orthonormal terms, (rows, terms).
 
         An error is a process of first order with white noise, R_ij = a φ^|i−j| + (1 − a) δ_ij. The restricted
         likelihood of each φ and a (Harville, J. Am. Stat. Assoc. 72, 1977), which the terms do not bias, gives its
@@ -58,15 +58,16 @@ class CorrelatedScatter:
         pairs = (terms[:, :, np.newaxis] * terms[:, np.newaxis, :]).reshape(rows, count * count)
         normal = (1 / spectrum @ pairs).reshape(-1, count, count)
         score = 1 / spectrum @ (terms * left[:, np.newaxis])
-        rest = 1 / spectrum @ left**2 - np.einsum("gi,gi->g", score, np.linalg.solve(normal, score[:, :, None])[..., 0])
-        rest = np.maximum(rest, np.finfo(float).tiny)
+        explained = np.einsum("gi,gi->g", score, np.linalg.solve(normal, score[:, :, None])[..., 0])
+        remainder = 1 / spectrum @ left**2 - explained
+        remainder = np.maximum(remainder, np.finfo(float).tiny)
         freedom = rows - count
-        likelihood = -0.5 * (np.log(spectrum).sum(axis=1) + np.linalg.slogdet(normal)[1] + freedom * np.log(rest))
+        likelihood = -0.5 * (np.log(spectrum).sum(axis=1) + np.linalg.slogdet(normal)[1] + freedom * np.log(remainder))
         probability = prior * np.exp(likelihood - likelihood.max())
         probability /= probability.sum()
-        among = (spectrum @ pairs).reshape(-1, count, count) * (rest / freedom)[:, np.newaxis, np.newaxis]
+        among = (spectrum @ pairs).reshape(-1, count, count) * (remainder / freedom)[:, np.newaxis, np.newaxis]
         return cls(
-            probability, among, float(np.sqrt(probability @ rest / freedom)), float(probability @ neighbour),
+            probability, among, float(np.sqrt(probability @ remainder / freedom)), float(probability @ neighbour),
             float(freedom),
         )  # fmt: skip
 
@@ -206,12 +207,12 @@ def robust_fit(terms: Floats, value: Floats, sigma: Floats) -> RobustFit:
     start = _least_absolute(q, y)
     scale = _MAD * float(np.median(np.abs(y - q @ start))) * rows / (rows - count)
     scale = max(scale, _TINY * float(np.abs(y).max()), np.finfo(float).tiny)
-    at, weight = _bisquare(q, y, start, scale)
-    left = y - q @ at
+    coefficients, weight = _bisquare(q, y, start, scale)
+    left = y - q @ coefficients
     influence = _influence(left, weight, scale)
     to_q = solve_triangular(r, np.eye(count), lower=False)
     errors = CorrelatedScatter.of(q, influence).seen_as(to_q)
-    return RobustFit(to_q @ at, left * own, weight, errors.scatter, errors)
+    return RobustFit(to_q @ coefficients, left * own, weight, errors.scatter, errors)
 
 
 def _own_errors(terms: Floats, value: Floats, sigma: Floats) -> Floats:
@@ -228,25 +229,25 @@ def _own_errors(terms: Floats, value: Floats, sigma: Floats) -> Floats:
 
 def _least_absolute(q: Floats, y: Floats) -> Floats:
     """Least absolute deviations, by weighted least squares."""
-    at = np.asarray(q.T @ y)
-    left = np.abs(y - q @ at)
+    coefficients = np.asarray(q.T @ y)
+    left = np.abs(y - q @ coefficients)
     least = 1e-3 * float(np.median(left)) + _TINY * float(np.abs(y).max()) + np.finfo(float).tiny
     for _ in range(15):
-        at = _weighted(q, y, least / np.maximum(left, least))
-        left = np.abs(y - q @ at)
-    return at
+        coefficients = _weighted(q, y, least / np.maximum(left, least))
+        left = np.abs(y - q @ coefficients)
+    return coefficients
 
 
-def _bisquare(q: Floats, y: Floats, at: Floats, scale: float) -> tuple[Floats, Floats]:
+def _bisquare(q: Floats, y: Floats, coefficients: Floats, scale: float) -> tuple[Floats, Floats]:
     weight = np.ones(len(y))
     for _ in range(_ITERATIONS):
-        weight = np.clip(1 - ((y - q @ at) / (_BISQUARE * scale)) ** 2, 0.0, None) ** 2
+        weight = np.clip(1 - ((y - q @ coefficients) / (_BISQUARE * scale)) ** 2, 0.0, None) ** 2
         new = _weighted(q, y, weight)
-        close = float(np.abs(new - at).max()) <= _CLOSE * scale
-        at = new
+        close = float(np.abs(new - coefficients).max()) <= _CLOSE * scale
+        coefficients = new
         if close:
             break
-    return at, weight
+    return coefficients, weight
 
 
 def _weighted(q: Floats, y: Floats, weight: Floats) -> Floats:

@@ -203,14 +203,14 @@ def trend_of(
         return NotAssessed(len(rows), Message("the covariates cannot be separated from each other or from the time"))
     bound = bound_95[rows]
     sigma = np.where(np.isfinite(bound) & (bound > 0), bound, 0.0) / _BOUND_95
-    found = segmentation(month, terms, value[rows], sigma)
+    segments = segmentation(month, terms, value[rows], sigma)
     remarks += _alike(terms, names)
     used = {name: usable[name][rows] for name in names}
-    return _trend(found, _HEAD + others.shape[1], time, bound, used, tuple(remarks), len(time_s) - len(rows))
+    return _trend(segments, _HEAD + others.shape[1], time, bound, used, tuple(remarks), len(time_s) - len(rows))
 
 
 def _trend(
-    found: Segmentation,
+    segments: Segmentation,
     before: int,
     time: Floats,
     bound: Floats,
@@ -219,41 +219,41 @@ def _trend(
     left_out: int,
 ) -> Trend:
     """The trend from a regression whose changes follow after so many terms."""
-    value, unit, to_s = found.coefficients, np.eye(len(found.coefficients)), float(time[0])
-    changing = found.terms.copy()
+    value, unit, to_s = segments.coefficients, np.eye(len(segments.coefficients)), float(time[0])
+    changing = segments.terms.copy()
     changing[:, _HEAD:before] = 0.0
-    bends = [i for i, place in enumerate(found.places) if place.kind == "bend"]
+    bends = [i for i, place in enumerate(segments.places) if place.kind == "bend"]
     slope = unit[[1, *(before + i for i in bends)]].sum(axis=0)
     total = changing[-1] - changing[0]
     line = changing @ value
-    slope_bound, total_bound, *bounds = found.accuracy.bound_95(np.vstack([slope, total, unit])).tolist()
+    slope_bound, total_bound, *bounds = segments.accuracy.bound_95(np.vstack([slope, total, unit])).tolist()
     return Trend(
         runs=len(time),
-        outliers=int((found.fit.weight == 0).sum()),
+        outliers=int((segments.fit.weight == 0).sum()),
         left_out=left_out,
         since_s=to_s,
         until_s=float(time[-1]),
         level=float(line[0]),
         per_month=float(value @ slope),
         per_month_bound_95=slope_bound,
-        slope_since_s=to_s + max((found.places[i].time for i in bends), default=0.0) * MONTH_S,
+        slope_since_s=to_s + max((segments.places[i].time for i in bends), default=0.0) * MONTH_S,
         change=float(value @ total),
         change_bound_95=total_bound,
         changes=tuple(
             ChangePoint(place.kind, to_s + place.time * MONTH_S, float(value[i]), bounds[i])
-            for i, place in enumerate(found.places, before)
+            for i, place in enumerate(segments.places, before)
         ),
         effects=tuple(Effect(name, float(value[i]), bounds[i]) for i, name in enumerate(covariates, _HEAD)),
-        p=min(1.0, 2 * min(found.without.p(np.eye(before)[1]), found.p)),
-        scatter=found.fit.scatter,
-        correlation=found.fit.correlation,
+        p=min(1.0, 2 * min(segments.without.p(np.eye(before)[1]), segments.p)),
+        scatter=segments.fit.scatter,
+        correlation=segments.fit.correlation,
         remarks=remarks,
         time_s=time,
-        adjusted=line + found.fit.residual,
+        adjusted=line + segments.fit.residual,
         bound_95=bound,
-        counted=found.fit.weight > 0,
+        counted=segments.fit.weight > 0,
         line=line,
-        line_bound_95=found.accuracy.bound_95(changing),
+        line_bound_95=segments.accuracy.bound_95(changing),
         covariates=covariates,
     )
 

@@ -90,18 +90,18 @@ def compare_command(
     if kind is Comparison and (gantry is not None or cart is not None):
         raise _one_response()
     more = _described(gantry, cart) if entry is None else {"entry": entry}
-    found = kind.of(before, after, ignore_below=_share(ignore_below), **more)
+    comparison = kind.of(before, after, ignore_below=_share(ignore_below), **more)
     files: list[Path] = []
     remark = ""
     if out is not None:
-        first = header(recorded_report(found.later.summary), template, ask, options)
+        first = header(recorded_report(comparison.later.summary), template, ask, options)
         with in_language(language or first.language or "en"):
-            document = found.document(datetime.now(UTC), header=first, appendix=appendix)
+            document = comparison.document(datetime.now(UTC), header=first, appendix=appendix)
             files, remark = write_documents(document, out, force=force)
     if as_json:
-        print(to_json(found.plain()))
+        print(to_json(comparison.plain()))
         return
-    for line in (*found.printed, *filter(None, (*files, remark))):
+    for line in (*comparison.printed, *filter(None, (*files, remark))):
         print(line)
 
 

@@ -102,8 +102,8 @@ def report_command(
         )
     results = [a.result for a in accepted]
     if as_json:
-        found = {"files": list(map(str, files)), "verdict": document.result[0].tone}
-        print(to_json(found | ({"limits": [a.plain() for a in accepted]} if accepted else {})))
+        result = {"files": list(map(str, files)), "verdict": document.result[0].tone}
+        print(to_json(result | ({"limits": [a.plain() for a in accepted]} if accepted else {})))
     else:
         for line in filter(None, (*files, remark, _counted(results))):
             print(line)

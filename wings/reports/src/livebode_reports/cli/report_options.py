@@ -79,17 +79,17 @@ def header(recorded: ReportSection, template: Path | None, ask: bool, options: d
     UsageError
         If --ask is used without a terminal.
     """
-    found = recorded
+    header = recorded
     if template is not None:
         from livebode.configuration import read_template
 
         used = read_template(template)
-        found = found.over({name: getattr(used, name) for name in used.model_fields_set})
-    found = found.over(options)
-    return found.over(_answers(found)) if ask else found
+        header = header.over({name: getattr(used, name) for name in used.model_fields_set})
+    header = header.over(options)
+    return header.over(_answers(header)) if ask else header
 
 
-def _answers(found: ReportSection) -> dict[str, str | None]:
+def _answers(header: ReportSection) -> dict[str, str | None]:
     if not sys.stdin.isatty():
         raise UsageError(
             "conflict",
@@ -97,7 +97,7 @@ def _answers(found: ReportSection) -> dict[str, str | None]:
             "use the options --machine, --serial-number and so on, or a --template",
             argument="--ask",
         )
-    missing = {name: words for name, words in _ASKED.items() if not getattr(found, name)}
+    missing = {name: words for name, words in _ASKED.items() if not getattr(header, name)}
     return {
         name: _text(typer.prompt(f"{words} (Enter: none)", default="", show_default=False, err=True))
         for name, words in missing.items()

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from livebode.cli import Json, console, is_terminal
+from livebode.cli import Json
 from livebode.core import ArchiveError, UsageError
-from livebode_plant.cli.archive.options import LakeOf
-from livebode_plant.cli.archive.selection import SelectionOptions, with_selection
+from livebode_plant.cli.archive.selection import LakeOf, SelectionOptions, print_table, with_selection
 
 if TYPE_CHECKING:
     from livebode_plant.lake import Lake
@@ -20,7 +18,7 @@ if TYPE_CHECKING:
 _COLUMNS = ("quantity", "first", "second", "difference", "in %", "unit", "runs")
 
 
-@with_selection("since", "until", "covariate", "recipe")
+@with_selection("since", "until", "covariate")
 def compare_command(
     archive: LakeOf,
     first: Annotated[str, typer.Argument(metavar="AXIS", help="site/line/machine/axis.")],
@@ -48,35 +46,28 @@ def compare_command(
             "missing", "there is nothing to compare with, or twice", "name another axis, or --split DATE",
             argument="--split",
         )  # fmt: skip
-    found, few = differences(_pairs(Lake(lake_url(archive)), chosen.selection(), first.strip("/"), second, split))
+    different, few = differences(_pairs(Lake(lake_url(archive)), chosen.selection(), first.strip("/"), second, split))
     if as_json:
-        print(to_json({"differences": [vars(one) for one in found], "too_few_runs": few}))
+        print(to_json({"differences": [vars(difference) for difference in different], "too_few_runs": few}))
         return
-    if found:
-        _print_table(found)
+    if different:
+        print_table(_COLUMNS, map(_row, different))
     for name in few:
         print(f"{name}: not compared: fewer than 8 runs on a side")
-    if any(one.significant for one in found):
+    if any(difference.significant for difference in different):
         print("*: at most 5 % of the differences marked are expected to be none")
 
 
-def _print_table(found: Sequence[LevelDifference]) -> None:
-    from rich.table import Table
-
+def _row(of: LevelDifference) -> tuple[str, ...]:
     from livebode.core import with_bound
 
-    table = Table(box=None, pad_edge=False)
-    for column in _COLUMNS:
-        table.add_column(column)
-    for one in found:
-        percent = 100 / abs(one.first) if one.first and one.unit != "dB" else None
-        table.add_row(
-            one.name + " *" * one.significant, f"{one.first:.5g}", f"{one.second:.5g}",
-            " ± ".join(with_bound(one.amount, one.bound_95)),
-            "" if percent is None else " ± ".join(with_bound(percent * one.amount, percent * one.bound_95)), one.unit,
-            f"{one.runs[0]} / {one.runs[1]}",
-        )  # fmt: skip
-    console(width=None if is_terminal() else 1 << 14, markup=False).print(table)
+    percent = 100 / abs(of.first) if of.first and of.unit != "dB" else None
+    return (
+        of.name + " *" * of.significant, f"{of.first:.5g}", f"{of.second:.5g}",
+        " ± ".join(with_bound(of.amount, of.bound_95)),
+        "" if percent is None else " ± ".join(with_bound(percent * of.amount, percent * of.bound_95)), of.unit,
+        f"{of.runs[0]} / {of.runs[1]}",
+    )  # fmt: skip
 
 
 def _pairs(
@@ -90,8 +81,8 @@ def _pairs(
     if second is not None:
         before = after = histories(lake, of)
     else:
-        at = day(split, "--split")
-        before, after = histories(lake, replace(of, until=at)), histories(lake, replace(of, since=at))
+        since = day(split, "--split")
+        before, after = histories(lake, replace(of, until=since)), histories(lake, replace(of, since=since))
     names = {axis for history in (*before, *after) for axis in history.machines}
     for axis in (first, second or first):
         if axis not in names:

@@ -12,18 +12,17 @@ import typer
 
 from livebode.cli import Json, console
 from livebode.core import ConfigError, LivebodeError, UsageError, counted
-from livebode_plant.cli.archive.options import LakeOf
-from livebode_plant.cli.archive.selection import SelectionOptions, with_selection
+from livebode_plant.cli.archive.selection import LakeOf, SelectionOptions, with_selection
 
 if TYPE_CHECKING:
     from livebode_plant.archive.archive_settings import ArchiveSettings
-    from livebode_plant.archive.healthy_runs import HealthyRuns
+    from livebode_plant.archive.learning import HealthyRuns
     from livebode_plant.lake import Lake
 
 _REFUSED = 2
 
 
-@with_selection("below", "since", "until", "recipe")
+@with_selection("below", "since", "until")
 def learn_command(
     archive: LakeOf,
     chosen: SelectionOptions,
@@ -49,7 +48,6 @@ def learn_command(
             "are retained in NAME.history beside it.",
         ),
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace existing files; a baseline is retained.")] = False,
     as_json: Json = False,
 ) -> None:
     """Learn a baseline of one machine, or of each machine of a hall, from its healthy runs in the lake.
@@ -61,21 +59,21 @@ def learn_command(
     from livebode.cli import check_replaceable
     from livebode.records import to_json
     from livebode_plant.archive.archive_settings import lake_url
-    from livebode_plant.archive.healthy_runs import contents_of, healthy_runs
+    from livebode_plant.archive.learning import contents_of, healthy_runs
     from livebode_plant.lake import Lake
 
     settings = _settings(archive)
     lake = Lake(settings.lake if settings else lake_url(archive))
-    of = replace(chosen, recipe=chosen.recipe or _recipe(settings)).selection()
-    found = healthy_runs(lake, of.without(contents_of(lake, exclude or ())))
-    files = _files(found, out or (settings.baselines if settings else None), each=each)
+    of = replace(chosen, recipe=_recipe(settings)).selection()
+    axes = healthy_runs(lake, of.without(contents_of(lake, exclude or ())))
+    files = _files(axes, out or (settings.baselines if settings else None), each=each)
     for file in files:
-        check_replaceable(file, reason, force=force)
+        check_replaceable(file, reason, force=False)
     learned: list[dict[str, Any]] = []
     refused: dict[str, LivebodeError] = {}
-    for one, file in zip(found, files):
+    for one, file in zip(axes, files):
         try:
-            learned.append(_learned(lake, one, file, reason, accept=accept, force=force))
+            learned.append(_learned(lake, one, file, reason, accept=accept))
         except LivebodeError as error:
             if not each:
                 raise
@@ -112,18 +110,17 @@ def _recipe(settings: ArchiveSettings | None) -> str | None:
     return recipe_id(axes[0]) if len(axes) == 1 else None
 
 
-def _files(found: Sequence[HealthyRuns], text: str | None, *, each: bool) -> list[Path]:
+def _files(axes: Sequence[HealthyRuns], text: str | None, *, each: bool) -> list[Path]:
     """The file of each axis."""
-    from livebode_plant.archive.archive_settings import check_baselines
-    from livebode_plant.archive.template import Template
+    from livebode_plant.archive.archive_settings import Template, check_baselines
 
     if text is None:
         raise UsageError("missing", "the file of the baseline is not named", "give --out FILE", argument="out")
-    if len(found) > 1 and not each:
-        names = ", ".join(one.axis for one in found[:5]) + ", …" * (len(found) > 5)
+    if len(axes) > 1 and not each:
+        names = ", ".join(axis.axis for axis in axes[:5]) + ", …" * (len(axes) > 5)
         raise UsageError(
             "missing",
-            f"{len(found)} axes are selected ({names})",
+            f"{len(axes)} axes are selected ({names})",
             "choose one with --machine, or learn a baseline for each with --each",
             options=["--machine", "--each"],
         )
@@ -131,13 +128,13 @@ def _files(found: Sequence[HealthyRuns], text: str | None, *, each: bool) -> lis
         check_baselines(text, "out")
     except ConfigError as error:
         raise UsageError("unreadable", error.message, error.remedy, argument="out", value=text) from None
-    files = [Template(text).filled(one.levels) for one in found]
-    for one, file in zip(found, files):
+    files = [Template(text).filled(axis.levels) for axis in axes]
+    for axis, file in zip(axes, files):
         if file is None or files.count(file) > 1:
             why = "has a level that is not known" if file is None else "is that of several axes"
             raise UsageError(
                 "unreadable",
-                f"the file of {one.axis}, {text!r}, {why}",
+                f"the file of {axis.axis}, {text!r}, {why}",
                 "name other levels in it: {site}, {line}, {machine}, {axis}",
                 argument="out",
                 value=text,
@@ -145,9 +142,7 @@ def _files(found: Sequence[HealthyRuns], text: str | None, *, each: bool) -> lis
     return [Path(file) for file in files if file is not None]
 
 
-def _learned(
-    lake: Lake, of: HealthyRuns, file: Path, reason: str | None, *, accept: bool, force: bool
-) -> dict[str, Any]:
+def _learned(lake: Lake, of: HealthyRuns, file: Path, reason: str | None, *, accept: bool) -> dict[str, Any]:
     from livebode.cli import write_baseline
     from livebode_plant.archive.learning import learn_of_lake  # with the simulation
 
@@ -158,7 +153,7 @@ def _learned(
     read = {name: getattr(learned, name) for name in ("responses", "recordings", "size_bytes")}
     remarks = [*of.remarks, *(of.doubts if accept else ())]
     own = {"machine": of.axis, "read": read, "remarks": remarks}
-    return own | write_baseline(learned.baseline, file, reason, force=force)
+    return own | write_baseline(learned.baseline, file, reason, force=False)
 
 
 def _print(one: dict[str, Any], *, short: bool) -> None:

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
-from livebode.cli import Csv, Json, RowsMax, check_query, console, is_terminal, print_result
-from livebode_plant.cli.archive.options import LakeOf
+from livebode.cli import Csv, Json, RowsMax, check_query, print_result
+from livebode_plant.cli.archive.selection import LakeOf, print_table
 
 _COLUMNS = ("machine", "runs", "judged", "alarming", "quarantined", "first", "last")
 
 
 def list_command(
+    context: typer.Context,
     archive: LakeOf,
     quarantined: Annotated[
         bool, typer.Option("--quarantined", help="List the recordings in quarantine, with the reason of each.")
@@ -38,8 +39,8 @@ def list_command(
     from livebode_plant.archive.contents import machines, quarantine
     from livebode_plant.lake import Lake
 
+    check_query(context, as_csv=as_csv, as_json=as_json)
     lake = Lake(lake_url(archive))
-    check_query(sql, as_csv=as_csv, as_json=as_json, others={"--quarantined": quarantined})
     if sql is not None:
         from livebode_plant.lake.query import query_lake
 
@@ -50,25 +51,15 @@ def list_command(
         if as_json:
             print(to_json({"quarantine": bad}))
         elif bad:
-            _print(("recording", "code", "reason"), [(one["url"], one["code"], one["sentence"]) for one in bad])
+            print_table(("recording", "code", "reason"), [(row["url"], row["code"], row["sentence"]) for row in bad])
         else:
             print("no recording is in quarantine")
         return
-    found = [one.plain for one in machines(lake)]
+    rows_of_machines = [row.plain for row in machines(lake)]
     if as_json:
-        print(to_json({"machines": found}))
-    elif found:
-        _print(_COLUMNS, [tuple(row.values()) for row in found])
+        print(to_json({"machines": rows_of_machines}))
+    elif rows_of_machines:
+        words = [["" if value is None else str(value) for value in row.values()] for row in rows_of_machines]
+        print_table(_COLUMNS, words, _COLUMNS[1:5])
     else:
         print(f"the lake {lake.url} has no run yet")
-
-
-def _print(columns: tuple[str, ...], rows: list[tuple[Any, ...]]) -> None:
-    from rich.table import Table
-
-    table = Table(box=None, pad_edge=False)
-    for column in columns:
-        table.add_column(column, overflow="fold", justify="right" if column in _COLUMNS[1:5] else "left")
-    for row in rows:
-        table.add_row(*("" if value is None else str(value) for value in row))
-    console(width=None if is_terminal() else 1 << 14, markup=False).print(table)

@@ -1,9 +1,9 @@
-"""Options by which commands select runs of a lake."""
+"""The argument and the options by which the subcommands of `livebode archive` select a lake and its runs."""
 
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from enum import StrEnum
@@ -12,10 +12,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from livebode.cli import console, is_terminal
 from livebode.core import UsageError
 
 if TYPE_CHECKING:
     from livebode_plant.trending import Selection
+
+LakeOf = Annotated[str, typer.Argument(metavar="ARCHIVE", help="archive.toml, or the directory or URL of its lake.")]
 
 
 class By(StrEnum):
@@ -103,8 +106,8 @@ def with_selection(*names: str) -> Callable[[Callable[..., None]], Callable[...,
         signature = inspect.signature(command, eval_str=True)
         for name, parameter in signature.parameters.items():
             if name == "chosen":
-                options = ((one, *_OPTIONS[one]) for one in names)
-                parameters += [inspect.Parameter(one, kind, default=d, annotation=of) for one, of, d in options]
+                options = ((name, *_OPTIONS[name]) for name in names)
+                parameters += [inspect.Parameter(name, kind, default=d, annotation=of) for name, of, d in options]
             else:
                 parameters.append(parameter.replace(kind=kind))
         selecting.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
@@ -128,3 +131,15 @@ def day(text: str | None, option: str) -> datetime | None:
             argument=option,
             value=text,
         ) from None
+
+
+def print_table(columns: Sequence[str], rows: Iterable[Sequence[str]], right: Sequence[str] = ()) -> None:
+    """Print a table whose columns in `right` are numbers; in full width where the output is not a terminal."""
+    from rich.table import Table
+
+    table = Table(box=None, pad_edge=False)
+    for column in columns:
+        table.add_column(column, overflow="fold", justify="right" if column in right else "left")
+    for row in rows:
+        table.add_row(*row)
+    console(width=None if is_terminal() else 1 << 14, markup=False).print(table)

@@ -1,22 +1,21 @@
-"""`livebode archive trend`: how a quantity changes over months, for each machine of a lake."""
+"""`livebode archive trend`: how quantities change over months, for each machine of a lake."""
 
 from __future__ import annotations
 
+from datetime import UTC, datetime
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from livebode.cli import Json, ReportLanguage, console, is_terminal
+from livebode.cli import Json, ReportLanguage
 from livebode.core import UsageError
-from livebode_plant.cli.archive.options import LakeOf
-from livebode_plant.cli.archive.selection import By, Limit, SelectionOptions, with_selection
+from livebode_plant.cli.archive.selection import By, LakeOf, Limit, SelectionOptions, print_table, with_selection
 
 if TYPE_CHECKING:
-    from livebode_plant.trending import Assessment, Ranked
-
-_NUMBERS = ("runs",)
+    from livebode_plant.lake import Lake
+    from livebode_plant.trending import Assessment, Ranked, Selection
 
 
 @with_selection("by", "below", "since", "until", "covariate", "recipe")
@@ -56,7 +55,6 @@ def trend_command(
     """
     from livebode.records import to_json
     from livebode_plant.archive.archive_settings import lake_url
-    from livebode_plant.cli.archive.hall_pages import write_hall_pages
     from livebode_plant.lake import Lake
     from livebode_plant.trending import assess, history
 
@@ -70,8 +68,8 @@ def trend_command(
         raise UsageError(
             "unreadable", f"--out={str(out)!r} is neither a .png nor a .csv", "choose one of them", argument="--out"
         )
-    found = history(lake, quantity, chosen.selection(By.machine))
-    (of,) = assess([found], limit)
+    runs = history(lake, quantity, chosen.selection(By.machine))
+    (of,) = assess([runs], limit)
     if out is not None:
         _write(of, out, dark=dark, force=force)
     if as_json:
@@ -86,23 +84,23 @@ def _check(quantity: str | None, of_one: dict[str, Any], of_all: dict[str, Any])
     """UsageError for an option of the other kind of result."""
     given = [option for option, value in (of_one if quantity is None else of_all).items() if value]
     if given:
-        what = "one quantity" if quantity is None else "the page of all quantities"
+        result = "one quantity" if quantity is None else "the page of all quantities"
         remedy = "name a QUANTITY" if quantity is None else "leave out the QUANTITY"
-        raise UsageError("conflict", f"{given[0]} is for {what}", f"{remedy}, or omit it", options=given[:1])
+        raise UsageError("conflict", f"{given[0]} is for {result}", f"{remedy}, or omit it", options=given[:1])
 
 
 def plain(of: Assessment) -> dict[str, Any]:
-    """For JSON."""
-    found = of.history
+    """Plain data for JSON."""
+    history = of.history
     return {
-        "quantity": found.name,
-        "model": found.model,
-        "unit": found.unit,
-        "recipe": found.recipe,
-        "runs": found.runs,
-        "without_date": found.undated,
-        "other_recipes": found.other_recipes,
-        "machines": [_row(of, one) for one in of.ranked],
+        "quantity": history.name,
+        "model": history.model,
+        "unit": history.unit,
+        "recipe": history.recipe,
+        "runs": history.runs,
+        "without_date": history.undated,
+        "other_recipes": history.other_recipes,
+        "machines": [_row(of, ranked) for ranked in of.ranked],
         "not_assessed": [{"machine": machine, "reason": reason} for machine, reason in of.not_assessed.items()],
         "silent": [{"machine": machine, "last": _day(time_s)} for machine, time_s in of.silent.items()],
     }
@@ -139,46 +137,46 @@ def _row(of: Assessment, one: Ranked) -> dict[str, Any]:
 
 
 def _print(of: Assessment, limit: float) -> None:
-    from rich.table import Table
-
     from livebode.core import counted
     from livebode_plant.report.trend_words import amount, change_words, months, scale
 
-    found, table = of.history, Table(box=None, pad_edge=False)
-    print(f"{found.name} ({found.model}): {counted(len(found.machines), 'machine')}, {counted(found.runs, 'run')}")
-    for column in ("machine", "runs", "a month", "since", "in all", "unit", "changes", "limit"):
-        table.add_column(column, overflow="fold", justify="right" if column in _NUMBERS else "left")
-    for one in of.ranked:
-        trend, unit = one.trend, found.unit_of(one.machine)
-        table.add_row(
-            one.machine + " *" * one.significant, str(trend.runs),
+    history = of.history
+    machines, runs = counted(len(history.machines), "machine"), counted(history.runs, "run")
+    print(f"{history.name} ({history.model}): {machines}, {runs}")
+    rows = []
+    for ranked in of.ranked:
+        trend, unit = ranked.trend, history.unit_of(ranked.machine)
+        rows.append((
+            ranked.machine + " *" * ranked.significant, str(trend.runs),
             amount(trend, trend.per_month, trend.per_month_bound_95, unit), _day(trend.slope_since_s),
             amount(trend, trend.change, trend.change_bound_95, unit), scale(trend, unit)[1],
-            ", ".join(change_words(trend, change, unit) for change in trend.changes), months(one, limit),
-        )  # fmt: skip
-    if of.ranked:
-        console(width=None if is_terminal() else 1 << 14, markup=False).print(table)
+            ", ".join(change_words(trend, change, unit) for change in trend.changes), months(ranked, limit),
+        ))  # fmt: skip
+    if rows:
+        print_table(("machine", "runs", "a month", "since", "in all", "unit", "changes", "limit"), rows, ("runs",))
     for line in remarks(of):
         print(line)
 
 
 def remarks(of: Assessment) -> list[str]:
     """What limits the result, as sentences."""
-    found = of.history
+    history = of.history
     lines = ["*: significant; at most 5 % of the machines marked are expected to be unchanged"] * any(
-        one.significant for one in of.ranked
+        ranked.significant for ranked in of.ranked
     )
-    lines += [f"{one.machine}: {remark}" for one in of.ranked for remark in one.trend.remarks]
-    lines += [f"{one.machine}: {one.trend.left_out} runs without a value or a covariate are left out"
-              for one in of.ranked if one.trend.left_out]  # fmt: skip
-    several = {one.machine: len(found.machines[one.machine].axes) for one in of.ranked}
+    lines += [f"{ranked.machine}: {remark}" for ranked in of.ranked for remark in ranked.trend.remarks]
+    lines += [f"{ranked.machine}: {ranked.trend.left_out} runs without a value or a covariate are left out"
+              for ranked in of.ranked if ranked.trend.left_out]  # fmt: skip
+    several = {ranked.machine: len(history.machines[ranked.machine].axes) for ranked in of.ranked}
     lines += [f"{machine}: {axes} axes together; --by axis shows each" for machine, axes in several.items() if axes > 1]
     lines += [f"{machine}: not assessed: {reason}" for machine, reason in of.not_assessed.items()]
     lines += [f"{machine}: no run since {_day(time_s)}" for machine, time_s in of.silent.items()]
-    if found.undated:
-        lines.append(f"{found.undated} runs without a date are left out")
-    if found.other_recipes:
-        lines.append(f"{found.other_recipes} runs with other settings than most of their axis are left out (--recipe)")
+    if history.undated:
+        lines.append(f"{history.undated} runs without a date are left out")
+    if history.other_recipes:
+        lines.append(
+            f"{history.other_recipes} runs with other settings than most of their axis are left out (--recipe)"
+        )
     return lines
 
 
@@ -190,8 +188,7 @@ def _write(of: Assessment, out: Path, *, dark: bool, force: bool) -> None:
         return
     from livebode.pictures import save as write_picture
     from livebode.pictures import style
-    from livebode_plant.report.trend_words import year_of
-    from livebode_plant.report.year import year_figure
+    from livebode_plant.report.trend_words import year_figure, year_of
 
     if not of.ranked:
         raise UsageError(
@@ -205,7 +202,7 @@ def _write(of: Assessment, out: Path, *, dark: bool, force: bool) -> None:
 def _write_csv(of: Assessment, path: Path) -> None:
     import csv
 
-    rows = [_row(of, one) for one in of.ranked]
+    rows = [_row(of, ranked) for ranked in of.ranked]
     flat = [{key: value for key, value in row.items() if not isinstance(value, list)} for row in rows]
     for row, own in zip(flat, rows):
         row["significant"] = str(own["significant"]).lower()
@@ -217,6 +214,29 @@ def _write_csv(of: Assessment, path: Path) -> None:
 
 
 def _day(time_s: float) -> str:
-    from livebode_plant.report.year import day
+    from livebode_plant.report.trend_words import day
 
     return day(time_s)
+
+
+def write_hall_pages(
+    lake: Lake, of: Selection, name: str, limit: float, language: str, out: Path, *, force: bool, as_json: bool
+) -> None:
+    """Write HTML and PDF with the trends of all quantities and machines, and print their names."""
+    from livebode.core import document_function
+    from livebode.language import in_language
+    from livebode.records import to_json
+    from livebode_plant.archive.contents import alarms_of, path_of, quarantine
+    from livebode_plant.report.hall_report import Hall
+    from livebode_plant.trending import assess, histories
+
+    bad = [(path_of(row), str(row["sentence"])) for row in quarantine(lake)]
+    title = name or of.below or Path(lake.url).name
+    hall = Hall(title, assess(histories(lake, of), limit), bad, limit, *alarms_of(lake, of))
+    with in_language(language):
+        files, remark = document_function("files")(hall.document(datetime.now(UTC)), out, force=force)
+    if as_json:
+        print(to_json({"files": list(map(str, files))} | hall.plain()))
+        return
+    for line in filter(None, (*files, remark)):
+        print(line)

@@ -12,9 +12,7 @@ from livebode.cli import Json
 from livebode_plant.cli.fleet.options import Fleet
 
 if TYPE_CHECKING:
-    from livebode_plant.fleet.check import CheckResult
     from livebode_plant.fleet.fleet_settings import FleetSettings
-    from livebode_plant.fleet.replay import ReplayedAxis
 
 
 def replay_command(
@@ -45,20 +43,12 @@ def replay_command(
 
 
 def _compare(settings: FleetSettings, *, as_json: bool) -> None:
-    import asyncio
-
     from livebode.records import to_json
-    from livebode_plant.cli.fleet.verdict import require_exact, verdict
-    from livebode_plant.fleet.check import check_results
-    from livebode_plant.fleet.log import FleetLog
+    from livebode_plant.fleet.log import with_log
+    from livebode_plant.fleet.replay import check_results, require_exact, verdict
 
     axes = settings.read_axes()
-
-    async def check() -> CheckResult:
-        async with FleetLog(settings.log, "livebode replay") as log:
-            return await check_results(log, axes)
-
-    result = asyncio.run(check())
+    result = with_log(settings.log, "livebode replay", lambda log: check_results(log, axes))
     if as_json:
         print(to_json(result.as_dict()))
     require_exact(result)
@@ -67,11 +57,9 @@ def _compare(settings: FleetSettings, *, as_json: bool) -> None:
 
 
 def _write(settings: FleetSettings, axis: str, begin_s: float, out: Path, *, as_json: bool) -> None:
-    import asyncio
-
     from livebode.core import FleetError, nearest_name
     from livebode.records import to_json
-    from livebode_plant.fleet.log import FleetLog
+    from livebode_plant.fleet.log import with_log
     from livebode_plant.fleet.replay import replayed, write_replayed
     from livebode_plant.fleet.subjects import axis_path
 
@@ -79,12 +67,9 @@ def _write(settings: FleetSettings, axis: str, begin_s: float, out: Path, *, as_
     keys = {axis_path(key): key for key in axes}
     if axis not in keys:
         raise FleetError("axis-unknown", f"the fleet has no axis {axis!r}", nearest_name(axis, sorted(keys)), axis=axis)
-
-    async def replay() -> ReplayedAxis:
-        async with FleetLog(settings.log, "livebode replay") as log:
-            return await replayed(log, keys[axis], axes[keys[axis]], begin_s)
-
-    files = write_replayed(asyncio.run(replay()), out)
+    key = keys[axis]
+    replay = with_log(settings.log, "livebode replay", lambda log: replayed(log, key, axes[key], begin_s))
+    files = write_replayed(replay, out)
     if as_json:
         print(to_json({"files": {str(path): {"rows": rows} for path, rows in files.items()}}))
         return

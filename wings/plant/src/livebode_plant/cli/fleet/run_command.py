@@ -48,25 +48,22 @@ def run_command(
 
 
 def _run(fleet: Path, *, as_json: bool) -> None:
-    from livebode_plant.fleet.worker_process import import_early
+    from livebode_plant.fleet.coordinator import import_early
 
     import_early()  # beside the imports of this process
-    import asyncio
-
     from livebode.cli import warnings_shown
     from livebode_plant.fleet.coordinator import FleetCoordinator
     from livebode_plant.fleet.fleet_settings import FleetSettings
-    from livebode_plant.fleet.log import FleetLog
+    from livebode_plant.fleet.log import FleetLog, with_log
 
     settings = FleetSettings.read(fleet)
     axes = settings.read_axes()
 
-    async def prepare() -> None:
-        async with FleetLog(settings.log, "livebode run") as log:
-            await log.create_streams(update=True)
-            await log.use_partitions(settings.partitions)
+    async def prepare(log: FleetLog) -> None:
+        await log.create_streams(update=True)
+        await log.use_partitions(settings.partitions)
 
-    asyncio.run(prepare())
+    with_log(settings.log, "livebode run", prepare)
     stop = threading.Event()
     with warnings_shown(), calls_at_end(stop.set), FleetCoordinator(settings, axes) as coordinator:
         if not as_json:
@@ -82,8 +79,8 @@ def _run_demo(*, as_json: bool) -> None:
     import tempfile
 
     from livebode.records import to_json
-    from livebode_plant.cli.fleet.verdict import require_exact, verdict
     from livebode_plant.fleet.demo import demo
+    from livebode_plant.fleet.replay import require_exact, verdict
 
     began = time.monotonic()
 

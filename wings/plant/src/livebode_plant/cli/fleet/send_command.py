@@ -33,12 +33,12 @@ def send_command(
 
     settings = FleetSettings.read(fleet)
     axes = ConfigurationFile(axis, {}).read()
-    keys = {machine_key(one, f"{axis}, axis {name}" if name else str(axis)): one for name, one in axes.items()}
+    keys = {machine_key(own, f"{axis}, axis {name}" if name else str(axis)): own for name, own in axes.items()}
     stop = threading.Event()
     with contextlib.ExitStack() as opened:
         opened.enter_context(warnings_shown())
         buffers = opened.enter_context(edge_buffers(settings.edge, keys))
-        sources = {key: opened.enter_context(make_source(one.source).open()) for key, one in keys.items()}
+        sources = {key: opened.enter_context(make_source(own.source).open()) for key, own in keys.items()}
         with calls_at_end(stop.set):  # not before: a source opens with the first data of its sender
             if not as_json:
                 print(f"{len(sources)} axes send to {settings.log.url}; Ctrl-C ends", flush=True)

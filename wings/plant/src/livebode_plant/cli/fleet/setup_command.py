@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from livebode.cli import Json
+from livebode.cli import Json, check_use
 from livebode.core import UsageError
 
 if TYPE_CHECKING:
@@ -17,6 +17,7 @@ _USERS = ("edge:PATH", "fleet", "view")
 
 
 def setup_command(
+    context: typer.Context,
     fleet: Annotated[
         Path | None, typer.Argument(metavar="FLEET.TOML", help="Configuration of the fleet; not for --user.")
     ] = None,
@@ -56,6 +57,7 @@ def setup_command(
             f"the users are {', '.join(_USERS)}",
             options=["--user"],
         )
+    check_use(context, "--user USER", ("--out",))
     if fleet is None:
         _write_key(user or "", out, as_json=as_json)
         return
@@ -72,10 +74,8 @@ def setup_command(
 
 
 def _server(settings: FleetSettings, store: Path, member: int | None, *, host: str, port: int) -> str:
-    from livebode_plant.fleet.partition_count import check_store
-    from livebode_plant.fleet.server_access import server_access
-    from livebode_plant.fleet.server_cluster import cluster_member
-    from livebode_plant.fleet.server_config import server_configuration
+    from livebode_plant.fleet.log import check_store
+    from livebode_plant.fleet.server_config import cluster_member, server_access, server_configuration
 
     check_store(store, settings.partitions)
     limit = round((settings.log.size_gb + settings.log.results_gb) * 1.1e9)
@@ -90,7 +90,7 @@ def _write_key(user: str, folder: Path, *, as_json: bool) -> None:
     from urllib.parse import quote
 
     from livebode.records import to_json
-    from livebode_plant.fleet.credentials import write_credentials
+    from livebode_plant.fleet.connection import write_credentials
 
     name, _, path = user.partition(":")
     if name not in ("edge", "fleet", "view") or (name == "edge") != bool(path):

@@ -25,25 +25,24 @@ def sink_command(
 
     from livebode.records import to_json
     from livebode_plant.fleet.fleet_settings import FleetSettings
-    from livebode_plant.fleet.log import FleetLog
+    from livebode_plant.fleet.log import FleetLog, with_log
     from livebode_plant.fleet.sink import Sink
     from livebode_plant.fleet.sink_tables import SinkTotals
 
     settings = FleetSettings.read(fleet)
     url = settings.sink.url
 
-    async def store() -> SinkTotals:
-        async with FleetLog(settings.log, "livebode sink") as log:
-            await log.create_streams()
-            sink, stop = Sink(log, settings.sink), asyncio.Event()
-            loop = asyncio.get_running_loop()
-            with calls_at_end(lambda: loop.call_soon_threadsafe(stop.set)):
-                if not (as_json or once):
-                    print(f"results of {settings.log.url} are stored in {url}; Ctrl-C ends", flush=True)
-                await sink.run(stop, once=once)
-            return sink.totals
+    async def store(log: FleetLog) -> SinkTotals:
+        await log.create_streams()
+        sink, stop = Sink(log, settings.sink), asyncio.Event()
+        loop = asyncio.get_running_loop()
+        with calls_at_end(lambda: loop.call_soon_threadsafe(stop.set)):
+            if not (as_json or once):
+                print(f"results of {settings.log.url} are stored in {url}; Ctrl-C ends", flush=True)
+            await sink.run(stop, once=once)
+        return sink.totals
 
-    totals = asyncio.run(store())
+    totals = with_log(settings.log, "livebode sink", store)
     if as_json:
         print(to_json(totals.as_dict() | {"lake": url}))
         return

@@ -1,40 +1,12 @@
 // @ts-check
 // What a person does with the alarm of an axis: acknowledge, shelve, unshelve.
-import { STATES } from "./alarmrows.js";
-import { hourMinute } from "./clock.js";
+import { actButton, open } from "./alarmrows.js";
 import { kindWords } from "./fleet_words.js";
 import { tr } from "./language.js";
 import { post, reason } from "./link.js";
-import { element } from "./make.js";
 import { askPerson, storedName } from "./person.js";
 
 /** @import { AxisRow, FleetFeed } from "./fleet_feed.js" */
-
-/** @param {AxisRow} row */
-export const open = ({ state }) => state === "unacknowledged" || state === "returned";
-
-/** @param {AxisRow} row */
-export function chip({ state, priority }) {
-  const [sign, words] = STATES[state];
-  /** @type {Record<string, string>} */
-  const priorities = { high: tr("high priority"), medium: tr("medium priority"), low: tr("low priority") };
-  const text = [`${sign} ${words}`, priorities[priority]].filter(Boolean).join(" · ");
-  return element("span", { class: `state ${state} ${priority}` }, text);
-}
-
-/** @param {AxisRow} row @returns {string[]} who acted, and why */
-export function persons({ by, comment, shelf }) {
-  const found = by ? [tr("acknowledged by {name}", { name: by }) + (comment ? `: ${comment}` : "")] : [];
-  if (shelf)
-    found.push(
-      tr("shelved by {name} until {time}: {reason}", {
-        name: shelf.by,
-        time: hourMinute(shelf.until_s),
-        reason: shelf.reason,
-      }),
-    );
-  return found;
-}
 
 export class Acts {
   /**
@@ -65,39 +37,20 @@ export class Acts {
     if (!this.may || row.state === "normal" || !row.raised) return [];
     const message = this.text(row),
       shelved = row.state === "shelved";
-    /** @param {string} label @param {string} words @param {() => void} act @param {boolean} disabled */
-    const button = (label, words, act, disabled = false) =>
-      element(
-        "button",
-        {
-          type: "button",
-          tabindex,
-          "aria-label": label,
-          disabled,
-          onclick: (event) => {
-            event.stopPropagation();
-            act();
-          },
-        },
-        words,
-      );
-    return [
-      ...(open(row)
-        ? [
-            button(
-              tr("Acknowledge: {message}", { message }),
-              tr("Acknowledge"),
-              () => this.acknowledge(row, after),
-              this.waiting.has(this.key(row)),
-            ),
-          ]
-        : []),
-      button(
-        shelved ? tr("Unshelve: {message}", { message }) : tr("Shelve: {message}", { message }),
-        shelved ? tr("Unshelve") : tr("Shelve"),
-        () => this.shelve(row, after),
-      ),
+    const acts = [
+      {
+        label: shelved ? tr("Unshelve: {message}", { message }) : tr("Shelve: {message}", { message }),
+        words: shelved ? tr("Unshelve") : tr("Shelve"),
+        act: () => this.shelve(row, after),
+      },
     ];
+    const acknowledge = {
+      label: tr("Acknowledge: {message}", { message }),
+      words: tr("Acknowledge"),
+      act: () => this.acknowledge(row, after),
+      disabled: this.waiting.has(this.key(row)),
+    };
+    return [...(open(row) ? [acknowledge] : []), ...acts].map((act) => actButton(act, tabindex));
   }
 
   /** @param {AxisRow} row */

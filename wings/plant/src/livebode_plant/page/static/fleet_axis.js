@@ -1,6 +1,6 @@
 // @ts-check
 // The dialog of one axis: its values, its alarm, and links to its own pages.
-import { chip, persons } from "./fleet_acts.js";
+import { chip, persons } from "./alarmrows.js";
 import { AxisTrend } from "./fleet_trend.js";
 import { kindWords, LOOKS, since, span, thousands, value } from "./fleet_words.js";
 import { tr } from "./language.js";

@@ -1,6 +1,6 @@
 // @ts-check
-// The web socket of a fleet's page: looks of all axes as bytes (fleet_frames.py), lists as JSON.
-import { below } from "./link.js";
+// The web socket of a fleet's page: looks of all axes as bytes (fleet_pages.py), lists as JSON.
+import { below, Link } from "./link.js";
 
 /**
  * @typedef {object} AxisRow An axis in a list; see fleet_board.py.
@@ -48,9 +48,7 @@ import { below } from "./link.js";
  * @property {import("./messages.js").Words} [words]
  */
 
-const PAUSE_MS = 250,
-  PAUSE_MS_MAX = 8000,
-  AXIS = 0x0fffffff;
+const AXIS = 0x0fffffff;
 
 export class FleetFeed {
   /** @type {Fleet | null} */
@@ -60,7 +58,8 @@ export class FleetFeed {
   looks = new Uint8Array();
   /** @type {Record<string, unknown>} */
   watched = { list: "worst", axis: null };
-  pauseMs = PAUSE_MS;
+  /** @type {Link<News, Record<string, unknown>> | null} */
+  link = null;
   frames = 0;
 
   /**
@@ -75,45 +74,27 @@ export class FleetFeed {
   }
 
   start() {
-    const { protocol, host } = location;
-    const socket = new WebSocket(`${protocol === "https:" ? "wss" : "ws"}://${host}${below("/live")}`);
-    this.socket = socket;
-    socket.binaryType = "arraybuffer";
-    socket.onopen = () => {
-      this.pauseMs = PAUSE_MS;
-      this.listeners.onState(true);
-      this.watch({});
-    };
     let waiting = Promise.resolve();
-    socket.onmessage = ({ data }) => {
-      waiting = waiting.then(() => this.take(data)); // in order: the axes are fetched between two messages
+    /** @param {() => void | Promise<void>} take */
+    const inOrder = (take) => {
+      waiting = waiting.then(take); // the axes are fetched between two messages
     };
-    socket.onclose = ({ code }) => {
-      this.listeners.onState(false);
-      if (code === 1008) {
-        location.reload();
-        return;
-      }
-      if (code === 4000) this.pauseMs = PAUSE_MS_MAX; // another browser has this place
-      setTimeout(() => this.start(), this.pauseMs);
-      this.pauseMs = Math.min(2 * this.pauseMs, PAUSE_MS_MAX);
-    };
+    this.link = new Link({
+      onNews: (news) => inOrder(() => this.take(news)),
+      onBytes: (data) => inOrder(() => this.frame(data)),
+      onState: this.listeners.onState,
+    });
+    this.watch({});
   }
 
   /** @param {Record<string, unknown>} change of the list, or of the axis */
   watch(change) {
     this.watched = { ...this.watched, ...change };
-    if (this.socket?.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify(this.watched));
+    this.link?.request(this.watched, "watched");
   }
 
-  /** @param {string | ArrayBuffer} data */
-  async take(data) {
-    if (typeof data !== "string") {
-      this.frame(data);
-      return;
-    }
-    /** @type {News} */
-    const news = JSON.parse(data);
+  /** @param {News} news */
+  async take(news) {
     if (news.fleet) await this.begin(news.fleet);
     if (news.layout === undefined || news.layout === this.fleet?.layout) this.listeners.onNews(news);
   }

@@ -1,7 +1,7 @@
 // @ts-check
 // Lists beside the tiles: the worst axes, alarms, workers, gaps. One tab stop each.
 import { chosen, remember } from "./address.js";
-import { chip, persons } from "./fleet_acts.js";
+import { chip, persons } from "./alarmrows.js";
 import { Rows } from "./fleet_rows.js";
 import { LOOKS, remarks, since, span, thousands } from "./fleet_words.js";
 import { tr, trn } from "./language.js";
