@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import socket
 import ssl
+import struct
 import subprocess
 import time
 from pathlib import Path
@@ -272,6 +273,22 @@ def test_datagrams_of_others_than_the_sender_are_dropped_and_named(interface):
             events = [event for event in source.take_events() if event.kind == "foreign"]
     assert epochs == {5}
     assert events[0].message == "a datagram from 127.0.0.3 was dropped; source.sender is 127.0.0.2"
+
+
+def test_a_plc_is_asked_at_the_port_and_from_the_net_id_that_are_configured(tmp_path):
+    with RingPeer(tmp_path) as peer:
+
+        def script() -> None:
+            peer.wait_ready()
+            for one in batches(4, epoch=3):
+                peer.send(one)
+
+        ports = {"ams_port": 852, "local_net_id": "5.6.7.8.1.1"}
+        with Feeding(script), make_source(SourceSettings(**peer.settings | ports)).open() as source:
+            assert next(source.blocks()).rate_hz == RATE_HZ
+        headers = [packet.ams_header for packet in peer._server.request_history]
+    assert {one.target_port for one in headers} == {struct.pack("<H", 852)}
+    assert {one.source_net_id for one in headers} == {bytes([5, 6, 7, 8, 1, 1])}
 
 
 def test_an_answer_of_a_plc_that_is_too_short_is_a_connection_that_is_tried_again(tmp_path):

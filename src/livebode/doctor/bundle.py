@@ -78,13 +78,13 @@ class Secrets:
         """A text without what was removed before, and without users and queries in URLs."""
         for secret_part in (*_USER_IN_URL.findall(text), *_QUERY_IN_URL.findall(text)):
             self._removed(secret_part)
-        for found in sorted(self._found, key=len, reverse=True):
-            text = text.replace(found, REMOVED)
+        for removed in sorted(self._found, key=len, reverse=True):
+            text = text.replace(removed, REMOVED)
         return text
 
     def _section(self, table: Any, model: type[BaseModel]) -> Any:
         if isinstance(table, list):
-            return [self._section(one, model) for one in table]
+            return [self._section(item, model) for item in table]
         if not isinstance(table, Mapping):
             return self._removed(table)
         return self._fields(table, model)
@@ -269,8 +269,8 @@ def _bounded(text: str) -> bytes:
 
 def versions() -> dict[str, Any]:
     """livebode, Python, the system, the kernel's instruction sets, and every installed package."""
-    read = (found.metadata for found in distributions())  # each time from its file
-    packages = {one["Name"]: one["Version"] for one in read if one["Name"]}
+    read = (distribution.metadata for distribution in distributions())  # each time from its file
+    packages = {metadata["Name"]: metadata["Version"] for metadata in read if metadata["Name"]}
     return {
         "livebode": __version__,
         "python": sys.version,

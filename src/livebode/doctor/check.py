@@ -48,7 +48,7 @@ class Check:
         return cls(name, "failed", message, error.remedy, {"code": error.code} | error.facts)
 
     def as_dict(self) -> dict[str, Any]:
-        """As plain data."""
+        """Plain data for JSON."""
         return asdict(self)
 
 

@@ -58,9 +58,9 @@ def _sync_s(place: Path) -> float:
     with tempfile.TemporaryFile(dir=place, buffering=0) as file:
         for _ in range(_SYNCS):
             began = time.perf_counter()
-            rest = memoryview(piece)
-            while rest:
-                rest = rest[file.write(rest) :]
+            remaining = memoryview(piece)
+            while remaining:
+                remaining = remaining[file.write(remaining) :]
             os.fsync(file.fileno())
             longest = max(longest, time.perf_counter() - began)
     return longest

@@ -23,15 +23,17 @@ _ALL = "all"  # the extra of all others
 
 def check_extras() -> Check:
     """The extras of the installed livebode, by its own metadata."""
-    found: dict[str, list[str]] = {
+    problems: dict[str, list[str]] = {
         extra: [] for extra in metadata("livebode").get_all("Provides-Extra") or () if extra != _ALL
     }
     required = requires("livebode") or []
     installed = cache(_version)  # several extras need the same package, and its metadata is a file
-    for extra in found:
+    for extra in problems:
         needed = packages_of(extra, required)
-        found[extra] = [problem for one in needed if (problem := _problem(one, installed(one.name)))]
-    return judged_extras(found)
+        problems[extra] = [
+            problem for requirement in needed if (problem := _problem(requirement, installed(requirement.name)))
+        ]
+    return judged_extras(problems)
 
 
 def judged_extras(problems: dict[str, list[str]]) -> Check:
@@ -57,12 +59,12 @@ def _version(name: str) -> str | None:
         return None
 
 
-def _problem(requirement: Requirement, found: str | None) -> str:
-    if found is None:
+def _problem(requirement: Requirement, version: str | None) -> str:
+    if version is None:
         return f"{requirement.name} is missing"
-    if requirement.specifier.contains(found, prereleases=True):
+    if requirement.specifier.contains(version, prereleases=True):
         return ""
-    return f"{requirement.name} {found} is installed, {requirement.specifier} is required"
+    return f"{requirement.name} {version} is installed, {requirement.specifier} is required"
 
 
 def _listed(names: Sequence[str]) -> str:

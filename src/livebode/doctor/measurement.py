@@ -67,8 +67,8 @@ def _check(of: str, axis: Axis) -> Check:
             samples = RecordedRun(settings.replay).samples
             return Check(name, "ok", f"{settings.replay} has {counted(samples, 'recorded sample')}")
         if settings.url is None:
-            found = [check_recording(name, axis, path) for path in settings.logs]
-            return next((check for check in found if check.verdict != "ok"), found[0])
+            checks = [check_recording(name, axis, path) for path in settings.logs]
+            return next((check for check in checks if check.verdict != "ok"), checks[0])
         reach = make_source(settings).reach()
         return Check(name, reach.verdict, reach.message, reach.remedy, reach.facts)
     except LivebodeError as error:
@@ -85,9 +85,9 @@ def check_configuration(subject: Subject) -> Check:
     if (error := subject.problems.get(CONFIGURATION)) is not None:
         return Check.of_error(CONFIGURATION, error)
     axes = "1 axis" if len(subject.axes) == 1 else f"{len(subject.axes)} axes"
-    what = subject.kind.title if subject.kind is not None else axes
+    words = subject.kind.title if subject.kind is not None else axes
     facts = {"path": str(subject.configuration), "axes": list(subject.axes)}
-    return Check(CONFIGURATION, "ok", f"{subject.configuration} is valid: {what}", facts=facts)
+    return Check(CONFIGURATION, "ok", f"{subject.configuration} is valid: {words}", facts=facts)
 
 
 def check_run(subject: Subject) -> Check:

@@ -70,9 +70,9 @@ class Subject:
         """
         files = [path for path in paths if path.suffix.lower() == ".toml"]
         runs = [path for path in paths if path not in files]
-        for found, what in ((files, "configurations"), (runs, "runs")):
-            if len(found) > 1:
-                raise UsageError("too-many", f"{len(found)} {what} are given", "give one of them", argument="targets")
+        for given, kind in ((files, "configurations"), (runs, "runs")):
+            if len(given) > 1:
+                raise UsageError("too-many", f"{len(given)} {kind} are given", "give one of them", argument="targets")
         return _read(files[0] if files else None, runs[0] if runs else None)
 
 

@@ -172,10 +172,12 @@ class Run:
         >>> axes.get_legend_handles_labels()[1]
         ['average', 'bound: 98.2 % (2σ)']
         """
-        found = self._averaged
+        average = self._averaged
         words = label or "average"
         bound = c if bounds else None
-        return plot_responses(found.overview, kind, axes=axes, c=bound, label=words, color=color, front=found.response)
+        return plot_responses(
+            average.overview, kind, axes=axes, c=bound, label=words, color=color, front=average.response
+        )
 
     def fit(
         self,

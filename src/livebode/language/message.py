@@ -70,7 +70,7 @@ class Message(str):
         >>> Message.conjunction(["a delay", "a lag", "a further mode"])
         'a delay and a lag and a further mode'
         """
-        return reduce(lambda one, other: cls("{one} and {other}", one=one, other=other), parts)
+        return reduce(lambda before, other: cls("{one} and {other}", one=before, other=other), parts)
 
     def plain(self) -> dict[str, Any]:
         """Template and facts for JSON; see `recorded`."""

@@ -37,16 +37,16 @@ def negotiated(asked: str, configured: str | None, accepted: str) -> str:
     ]
     for required, _, _ in sorted(preferences, key=lambda preference: -_weight(preference[2])):
         base = required.lower().partition("-")[0]
-        if found := next((code for code in available() if code.lower().partition("-")[0] == base), None):
-            return found
+        if matching := next((code for code in available() if code.lower().partition("-")[0] == base), None):
+            return matching
     return ENGLISH.code
 
 
 @cache
 def catalogue_for_page(code: str) -> bytes:
     """The catalogue as JSON, with the names of all languages."""
-    found = asdict(catalogue(code)) | {"languages": available()}
-    return json.dumps(found, ensure_ascii=False).encode()
+    page = asdict(catalogue(code)) | {"languages": available()}
+    return json.dumps(page, ensure_ascii=False).encode()
 
 
 def _weight(text: str) -> float:

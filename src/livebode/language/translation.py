@@ -47,16 +47,16 @@ class Catalogue:
 
     def singular(self, text: str) -> str:
         """The translation; the English text if there is none."""
-        found = self.messages.get(text, text)
-        return found if isinstance(found, str) else str(found[-1])
+        forms = self.messages.get(text, text)
+        return forms if isinstance(forms, str) else str(forms[-1])
 
-    def form(self, one: str, many: str, number: int) -> str:
+    def form(self, singular: str, many: str, number: int) -> str:
         """The plural form for this number."""
-        found = self.messages.get(one)
-        if not isinstance(found, list):
-            return one if number == 1 else many
-        at = number if number < 2 * _PLURAL_PERIOD else _PLURAL_PERIOD + number % _PLURAL_PERIOD
-        return str(found[int(self.plural[at])])
+        forms = self.messages.get(singular)
+        if not isinstance(forms, list):
+            return singular if number == 1 else many
+        digit = number if number < 2 * _PLURAL_PERIOD else _PLURAL_PERIOD + number % _PLURAL_PERIOD
+        return str(forms[int(self.plural[digit])])
 
 
 ENGLISH = Catalogue("en", "English")
@@ -65,13 +65,13 @@ ENGLISH = Catalogue("en", "English")
 @cache
 def available() -> dict[str, str]:
     """Names of the languages by code, English first."""
-    found = {ENGLISH.code: ENGLISH.name}
+    names = {ENGLISH.code: ENGLISH.name}
     folder = files("livebode.language") / "catalogues"
     for path in sorted(folder.iterdir(), key=lambda path: path.name):
         if path.name.endswith(".json"):
             read = json.loads(path.read_text("utf-8"))
-            found[read["code"]] = read["name"]
-    return found
+            names[read["code"]] = read["name"]
+    return names
 
 
 @cache
@@ -122,13 +122,13 @@ def tr(text: str, /, **values: Any) -> str:
     return _FORMATTER.vformat(current_language().singular(text), (), values)
 
 
-def trn(one: str, many: str, number: int, /, **values: Any) -> str:
-    """The same with plural forms; the number is the value ``{n}``.
+def trn(singular: str, many: str, number: int, /, **values: Any) -> str:
+    """A translated sentence with plural forms; the number is the value ``{n}``.
 
     >>> trn("{n:,} gap", "{n:,} gaps", 1), trn("{n:,} gap", "{n:,} gaps", 2)
     ('1 gap', '2 gaps')
     """
-    return _FORMATTER.vformat(current_language().form(one, many, number), (), values | {"n": number})
+    return _FORMATTER.vformat(current_language().form(singular, many, number), (), values | {"n": number})
 
 
 def number(value: Any, spec: str = "") -> str:

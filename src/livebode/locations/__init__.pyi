@@ -4,8 +4,8 @@ from livebode.locations.copies import local_copy as local_copy
 from livebode.locations.copies import original as original
 from livebode.locations.copies import shared_copy as shared_copy
 from livebode.locations.copies import with_originals as with_originals
-from livebode.locations.finding import Found as Found
-from livebode.locations.finding import find as find
+from livebode.locations.file_pattern import FoundFile as FoundFile
+from livebode.locations.file_pattern import find as find
 from livebode.locations.objects import read_bytes as read_bytes
 from livebode.locations.objects import write_whole as write_whole
 from livebode.locations.storage import make_parent as make_parent

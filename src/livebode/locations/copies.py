@@ -54,11 +54,11 @@ class LocalCopy:
         self._finalizer = weakref.finalize(self, remove_temporary, self.path)
         try:
             with reporting(url):
-                found = system.info(source)
-                if found["type"] == "directory":
+                information = system.info(source)
+                if information["type"] == "directory":
                     _download_directory(url, system, source, self.path)
                 else:
-                    _download(url, system, source, self.path, found)
+                    _download(url, system, source, self.path, information)
         except BaseException:
             self._finalizer()
             raise
@@ -76,11 +76,11 @@ def local_copy(place: str | os.PathLike[str] | Url) -> Iterator[Path]:
     ...     print(path)
     logs/a.csv
     """
-    found = location(place)
-    if isinstance(found, Path):
-        yield found
+    path_or_url = location(place)
+    if isinstance(path_or_url, Path):
+        yield path_or_url
         return
-    copy = shared_copy(found)
+    copy = shared_copy(path_or_url)
     try:
         yield copy.path
     except LivebodeError as error:
@@ -156,7 +156,7 @@ def _download_directory(url: Url, system: Any, source: str, to: Path) -> None:
         kinds = " or ".join(f"{kind} ({name})" for name, kind in _DIRECTORIES.items())
         raise LocationError("not-a-run", f"{url} is not {kinds}", "name a run directory or a file", path=str(url))
     to.mkdir()
-    for name, info in sorted(files.items(), key=lambda found: found[0] not in _DIRECTORIES):
+    for name, info in sorted(files.items(), key=lambda item: item[0] not in _DIRECTORIES):
         if ".." not in name.split("/"):
             (to / name).parent.mkdir(parents=True, exist_ok=True)
             _download(url / name, system, info["name"], to / name, info)

@@ -21,12 +21,12 @@ def read_bytes(place: str | os.PathLike[str] | Url) -> bytes:
     ExtraError
         If a package for this storage is not installed.
     """
-    found = location(place)
-    if isinstance(found, Path):
-        with reporting(Url(str(found))):
-            return found.read_bytes()
-    system, path = opened(found)
-    with reporting(found):
+    path_or_url = location(place)
+    if isinstance(path_or_url, Path):
+        with reporting(Url(str(path_or_url))):
+            return path_or_url.read_bytes()
+    system, path = opened(path_or_url)
+    with reporting(path_or_url):
         return bytes(system.cat_file(path))
 
 
@@ -55,13 +55,13 @@ def write_whole(place: str | os.PathLike[str] | Url, data: bytes, *, new: bool =
     ExtraError
         If a package for this storage is not installed.
     """
-    found = location(place)
-    if isinstance(found, Path):
-        _write_here(found, data, new)
+    path_or_url = location(place)
+    if isinstance(path_or_url, Path):
+        _write_here(path_or_url, data, new)
         return
-    system, path = opened(found)
-    with reporting(found):
-        make_parent(found, system, path)
+    system, path = opened(path_or_url)
+    with reporting(path_or_url):
+        make_parent(path_or_url, system, path)
         system.pipe_file(path, data, mode="create" if new else "overwrite")
 
 

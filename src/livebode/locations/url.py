@@ -93,10 +93,10 @@ def location(place: str | os.PathLike[str] | Url) -> Location:
     if isinstance(place, Url):
         return place
     text = os.fspath(place)
-    found = _SCHEME.match(text)
-    if found is None:
+    scheme = _SCHEME.match(text)
+    if scheme is None:
         return Path(place)
-    return _path_of(text) if found[1].lower() == "file" else Url(text)
+    return _path_of(text) if scheme[1].lower() == "file" else Url(text)
 
 
 def _path_of(url: str) -> Path:

@@ -32,7 +32,7 @@ class CanPeer(Peer):
         dbc.write_text(COUNTED)
         self.settings = {
             "url": f"can:virtual/{self.channel}", "dbc": dbc, "rate_hz": RATE_HZ, "channels": ["w", "y"],
-            "counter": "w", "can_fd": True,
+            "counter": "w", "can_fd": True, "bitrate": 1_000_000,
         }  # fmt: skip
         self._bus = can.Bus(interface="virtual", channel=self.channel, preserve_timestamps=True)
         return self

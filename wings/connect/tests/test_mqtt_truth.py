@@ -70,6 +70,15 @@ def test_results_events_and_the_description_for_home_assistant_are_at_the_broker
     assert len({str(of["device"]["identifiers"]) for of in found.values()}) == 1
 
 
+def test_without_discovery_home_assistant_hears_nothing(tmp_path: Path) -> None:
+    with Mosquitto(tmp_path) as broker, Subscriber(broker.port) as subscriber:
+        sent = section(broker, values=["parameters", "responses"], discovery=False)
+        with PublishedAxis(tmp_path, sent) as axis:
+            axis.measure()
+            until(lambda: any(topic.endswith("/x/response") for topic in subscriber.newest), "the results")
+    assert not [topic for topic in subscriber.newest if topic.startswith("homeassistant/")]
+
+
 def test_a_restart_of_the_broker_loses_no_event(tmp_path: Path) -> None:
     with Mosquitto(tmp_path) as broker:
         with PublishedAxis(tmp_path, section(broker, values=[])) as axis:

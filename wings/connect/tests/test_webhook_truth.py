@@ -7,6 +7,7 @@ import hmac
 import ssl
 from pathlib import Path
 
+import pytest
 import trustme
 
 from livebode.core import Event
@@ -43,6 +44,19 @@ def test_a_post_has_sentence_data_token_and_signature_over_tls(tmp_path: Path) -
     assert content["condition"] == "alarm"
     assert content["cause"] == "change: stiffness"
     assert (content["value"], content["unit"], content["unix_s"]) == (-2.5, "%", 1.8e9 + 10)
+
+
+def test_address_and_key_may_be_in_the_environment(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with HttpReceiver() as receiver:
+        monkeypatch.setenv("HOOK", f"http://127.0.0.1:{receiver.port}/secret")
+        monkeypatch.setenv("HOOK_KEY", "key of both")
+        section = {"kind": "webhook", "name": "hook", "url_env": "HOOK", "secret_env": "HOOK_KEY"}
+        with PublishedAxis(tmp_path, section) as axis:
+            axis.change(-2.5, 10)
+            until(lambda: receiver.posted, "the event")
+    path, headers, body = receiver.posted[0]
+    assert path == "/secret"
+    assert headers["X-Livebode-Signature"] == "sha256=" + hmac.new(b"key of both", body, hashlib.sha256).hexdigest()
 
 
 def test_an_unknown_certificate_is_refused(tmp_path: Path) -> None:

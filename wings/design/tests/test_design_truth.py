@@ -120,6 +120,14 @@ def test_a_design_from_a_run_predicts_as_the_run_s_machine_does(tmp_path):
     for name in ("torque", "speed", "following error"):
         sizes = [max(d["predicted"][name]["high"], -d["predicted"][name]["low"]) for d in (printed, truth)]
         assert sizes[0] == pytest.approx(sizes[1], rel=0.05), name
+    moving = described(
+        tmp_path, 'lines = "20:140:20"\nwindow = 400\nphases = "schroeder"\namplitude_n_m = 1.0\n',
+        measured + "following_error_m = [-0.01, 0.02]\nstroke_s = 10.0\n",
+    )  # fmt: skip
+    errors = json.loads(livebode("design", moving, "--out", tmp_path / "moving", "--json").out)["predicted"]
+    still, both = printed["predicted"]["following error"], errors["following error"]
+    assert both["low"] == pytest.approx(still["low"] - 0.01)
+    assert both["high"] == pytest.approx(still["high"] + 0.02)
     outside = described(tmp_path, 'lines = "20:160:20"\nwindow = 400\namplitude_n_m = 1.0\n', measured)
     refused = livebode("design", outside, "--out", tmp_path / "outside")
     assert refused.code == 2

@@ -84,11 +84,11 @@ def write_hall(path: Path) -> None:
     from livebode_plant.lake import TABLES, Lake
 
     lake = Lake(str(path))
-    rows = [row for number, axis in enumerate(_AXES) for row in _results(axis, number)]
-    for name, part in (("quantities", 0), ("runs", 1)):
-        own = [result for row in rows for result in (row[part] if part == 0 else [row[part]])]
-        for begin in range(0, len(own), _GROUP * 4):
-            lake.add_rows(name, pa.Table.from_pylist(own[begin : begin + _GROUP * 4], TABLES[name].schema))
+    results = [result for number, axis in enumerate(_AXES) for result in _results(axis, number)]
+    tables = {"quantities": [row for rows, _ in results for row in rows], "runs": [run for _, run in results]}
+    for name, rows in tables.items():
+        for begin in range(0, len(rows), _GROUP * 4):
+            lake.add_rows(name, pa.Table.from_pylist(rows[begin : begin + _GROUP * 4], TABLES[name].schema))
     lake.add_rows("quarantine", pa.Table.from_pylist([_bad("A/L2/M3/x")], TABLES["quarantine"].schema))
 
 

@@ -20,9 +20,9 @@ from hypothesis import strategies as st
 from livebode.core import Channel, FleetError, SpectraLayout
 from livebode.sources.live import Batch, SpectraBatch
 from livebode_plant.fleet import edge as edge_module
-from livebode_plant.fleet.edge import Edge, SoleSender, send_edges
+from livebode_plant.fleet.edge import Edge, SoleSender, edge_buffers, send_edges
 from livebode_plant.fleet.edge_buffer import EdgeBuffer
-from livebode_plant.fleet.fleet_settings import LogSection
+from livebode_plant.fleet.fleet_settings import EdgeSection, LogSection
 from livebode_plant.fleet.log import FleetLog
 from livebode_plant.fleet.message import read_message, write_message
 from livebode_plant.fleet.reader import stored_messages
@@ -54,6 +54,15 @@ def test_messages_come_back_in_order_after_a_restart(tmp_path: Path) -> None:
     assert len(again) - 25 < 10
     assert after.dropped == 0
     after.close()
+
+
+def test_the_axes_of_an_edge_share_the_space_of_its_buffer(tmp_path: Path) -> None:
+    with edge_buffers(EdgeSection(buffer=tmp_path, buffer_gb=0.008), ["x", "y"]) as buffers:
+        for number in range(60):
+            buffers["x"].append(bytes([number]) * 100_000)
+        assert 3_000_000 < buffers["x"].size_bytes <= 4_000_000
+        assert (buffers["x"].dropped + len(buffers["x"]), buffers["y"].dropped) == (60, 0)
+        assert _drained(buffers["x"])[-1] == bytes([59]) * 100_000
 
 
 @given(st.integers(1, 107))

@@ -55,10 +55,10 @@ def test_another_number_is_refused_while_the_log_has_data_and_accepted_before(
 
 def test_limits_of_an_existing_log_follow_the_settings_at_the_start_of_the_fleet(server: LogServer) -> None:
     _use(log_section(server.url), PARTITIONS)
-    changed = log_section(server.url).model_copy(update={"size_gb": 0.25, "axis_messages": 7})
+    changed = log_section(server.url).model_copy(update={"size_gb": 0.25, "axis_messages": 7, "age_days": 2.0})
     _use(changed, PARTITIONS)
     config = asyncio.run(_config(changed))
-    assert (config.max_bytes, config.max_msgs_per_subject) == (250_000_000, 7)
+    assert (config.max_bytes, config.max_msgs_per_subject, config.max_age) == (250_000_000, 7, 2 * 86400)
     assert config.description == f"livebode, {PARTITIONS} partitions"
 
 

@@ -122,7 +122,9 @@ class EdgeBuffer:
             try:
                 if self._files[-1].size_bytes + len(frame) > self._file_bytes and self._files[-1].count:
                     self._begin_file()
-                while sum(file.size_bytes for file in self._files) > self._bytes_max and len(self._files) > 1:
+                while (
+                    sum(file.size_bytes for file in self._files) + len(frame) > self._bytes_max and len(self._files) > 1
+                ):
                     self._drop()
                 self._open[-1].append(frame)
             except OSError as error:

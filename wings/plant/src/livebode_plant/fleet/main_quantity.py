@@ -11,7 +11,8 @@ import numpy as np
 from livebode.core import Parameters
 from livebode.runtime import ChangeDetection
 
-_STIFFNESS = ("N/m", "N m/rad")
+STIFFNESS = ("N/m", "N m/rad")
+"""Units of what a page shows first: a machine that wears gets softer."""
 
 
 @dataclass(frozen=True)
@@ -28,7 +29,7 @@ class MainQuantity:
 def main_quantity(parts: Sequence[Parameters], watched: Sequence[str]) -> str:
     """Name of the quantity: what the baseline watches first, else a stiffness, else a resonance, else the first one."""
     fits, derived = parts[0], parts[1]
-    stiff = (name for name, unit in zip(fits.names, fits.units) if unit in _STIFFNESS)
+    stiff = (name for name, unit in zip(fits.names, fits.units) if unit in STIFFNESS)
     resonances = (name for name in derived.names if name.startswith("resonance"))
     candidates = [*(name for name in watched if name in fits.names), *stiff, *resonances, *fits.names]
     return candidates[0]

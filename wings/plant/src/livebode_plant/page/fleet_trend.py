@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from livebode.arrays import Floats
 from livebode.core import LEVELS, ServerError
 from livebode.language import Message
+from livebode_plant.fleet.main_quantity import STIFFNESS
 
 if TYPE_CHECKING:
     from livebode_plant.lake import Lake
@@ -38,7 +39,6 @@ _SPAN = timedelta(days=366)
 _MINUTE_S, _DAY_S = 60.0, 86400.0
 _OF_FITS = ["model", "name", "unit", "value", "bound_95", "low", "high", "recipe"]
 _NUMBERS = ("at", "value", "bound_95", "low", "high")
-_STIFFNESS = ("N/m", "N m/rad")
 
 
 class QuantityName(NamedTuple):
@@ -262,7 +262,7 @@ def _alike(name: dict[str, str]) -> pc.Expression:
 
 def _rank(one: QuantityName, main: str) -> tuple[bool, bool, bool, str, str]:
     """The quantity of the tile first, then stiffnesses and resonances."""
-    return one.name != main, one.unit not in _STIFFNESS, not one.name.startswith("resonance"), one.name, one.model
+    return one.name != main, one.unit not in STIFFNESS, not one.name.startswith("resonance"), one.name, one.model
 
 
 def _trend(trend: Trend) -> dict[str, Any]:

@@ -16,7 +16,7 @@ _MAGIC = "*?["
 
 
 @dataclass(frozen=True)
-class Found:
+class FoundFile:
     """A file that a pattern names.
 
     Attributes
@@ -35,7 +35,7 @@ class Found:
     version: str
 
 
-def find(pattern: str | os.PathLike[str] | Url) -> list[Found]:
+def find(pattern: str | os.PathLike[str] | Url) -> list[FoundFile]:
     """The files that a path, a URL or a pattern with ``*``, ``?``, ``[…]`` and ``**`` names, sorted; possibly none.
 
     Parameters
@@ -54,22 +54,22 @@ def find(pattern: str | os.PathLike[str] | Url) -> list[Found]:
     return _below(place) if isinstance(place, Url) else _on_this_computer(place.expanduser())
 
 
-def _on_this_computer(place: Path) -> list[Found]:
+def _on_this_computer(place: Path) -> list[FoundFile]:
     if place.is_dir():
         paths = [path for path in place.rglob("*") if path.is_file()]
     elif place.exists():
         paths = [place]
     else:
         paths = [path for name in glob.glob(str(place), recursive=True) if (path := Path(name)).is_file()]
-    found = []
+    files = []
     for path in sorted(paths):
         with suppress(FileNotFoundError):  # removed meanwhile
             status = path.stat()
-            found.append(Found(path, status.st_size, f"{status.st_size}-{status.st_mtime_ns}"))
-    return found
+            files.append(FoundFile(path, status.st_size, f"{status.st_size}-{status.st_mtime_ns}"))
+    return files
 
 
-def _below(url: Url) -> list[Found]:
+def _below(url: Url) -> list[FoundFile]:
     system, path = opened(url)
     with reporting(url):
         if any(letter in path for letter in _MAGIC):
@@ -81,4 +81,4 @@ def _below(url: Url) -> list[Found]:
     # What a storage calls a path lacks the scheme, and for some the host.
     prefix = url.address.rstrip("/").removesuffix(path)
     ordered = sorted((name, info) for name, info in files.items() if info["type"] == "file")
-    return [Found(Url(prefix + name), info.get("size"), version(info)) for name, info in ordered]
+    return [FoundFile(Url(prefix + name), info.get("size"), version(info)) for name, info in ordered]
