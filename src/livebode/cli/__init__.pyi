@@ -33,7 +33,7 @@ from livebode.cli.recording_options import Time as Time
 from livebode.cli.recording_options import To as To
 from livebode.cli.remote import results_directory as results_directory
 from livebode.cli.running import run_targets as run_targets
-from livebode.cli.section_options import key_help as key_help
+from livebode.cli.section_options import with_keys as with_keys
 from livebode.cli.serving import dashboard_of as dashboard_of
 from livebode.cli.serving import print_line as print_line
 from livebode.cli.serving import wait_for_the_end as wait_for_the_end

@@ -43,6 +43,7 @@ from livebode.configuration.report_section import MARGIN_UNITS as MARGIN_UNITS
 from livebode.configuration.report_section import LimitSection as LimitSection
 from livebode.configuration.report_section import ReportSection as ReportSection
 from livebode.configuration.report_section import read_template as read_template
+from livebode.configuration.report_section import report_error as report_error
 from livebode.configuration.schema import Schema as Schema
 from livebode.configuration.schema import axis_schema as axis_schema
 from livebode.configuration.schema import schema_of as schema_of

@@ -94,7 +94,7 @@ class ReportSection(ConfigurationSection):
     language
         Language of the report. `--language` overrides it. Default: English.
     paper
-        Size of the pages.
+        Size of the pages: "a4" or "letter".
     limits
         Acceptance limits: a list of tables with quantity, min, max and band_hz.
     """

@@ -242,7 +242,7 @@ def test_the_first_page_is_from_template_and_options_on_the_paper_that_is_asked_
     [
         (("--ask",), "--ask needs a terminal"),
         (("--check",), "--check needs limits"),
-        (("--paper", "a5"), "choose a4, letter"),
+        (("--paper", "a5"), "Input should be 'a4' or 'letter'; correct it (option --paper)"),
         (("--logo", "none.png"), "the logo 'none.png' cannot be read"),
         (("--machine", "x" * 600), "more than 500 letters"),
         (("--template", "none.toml"), "there is no file none.toml"),

@@ -10,25 +10,13 @@ from typing import Annotated, Any
 
 import typer
 
-from livebode.cli import Entry, Json, ReportLanguage
+from livebode.cli import Entry, Json, ReportLanguage, with_keys
 from livebode.core import UsageError
 from livebode.locations import location
-from livebode_reports.cli.report_options import (
-    Appendix,
-    Ask,
-    Company,
-    Conditions,
-    Customer,
-    LogoFile,
-    Machine,
-    Operator,
-    PaperSize,
-    SerialNumber,
-    Template,
-    header,
-)
+from livebode_reports.cli.report_options import FIRST_PAGE, Appendix, Ask, Template, header
 
 
+@with_keys(report=FIRST_PAGE)
 def compare_command(
     before: Annotated[Path, typer.Argument(metavar="BEFORE", help="Run directory.", parser=location)],
     after: Annotated[
@@ -54,14 +42,8 @@ def compare_command(
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace existing files.")] = False,
     template: Template = None,
-    machine: Machine = None,
-    serial_number: SerialNumber = None,
-    operator: Operator = None,
-    company: Company = None,
-    customer: Customer = None,
-    conditions: Conditions = None,
-    logo: LogoFile = None,
-    paper: PaperSize = None,
+    *,
+    sections: dict[str, dict[str, Any]],
     language: ReportLanguage = None,
     ask: Ask = False,
     appendix: Appendix = False,
@@ -80,11 +62,7 @@ def compare_command(
     from livebode_reports.compare_report import Comparison, comparison_of
     from livebode_reports.files import write_documents
 
-    options = {
-        "machine": machine, "serial_number": serial_number, "operator": operator, "company": company,
-        "customer": customer, "conditions": conditions, "logo": logo, "paper": paper,
-    }  # fmt: skip
-    if out is None and (template is not None or ask or appendix or language or any(options.values())):
+    if out is None and (template is not None or ask or appendix or language or sections):
         raise _needs_out()
     kind = Comparison if entry is not None else comparison_of(before, after)
     if kind is Comparison and (gantry is not None or cart is not None):
@@ -94,7 +72,7 @@ def compare_command(
     files: list[Path] = []
     remark = ""
     if out is not None:
-        first = header(recorded_report(comparison.later.summary), template, ask, options)
+        first = header(recorded_report(comparison.later.summary), template, ask, sections.get("report", {}))
         with in_language(language or first.language or "en"):
             document = comparison.document(datetime.now(UTC), header=first, appendix=appendix)
             files, remark = write_documents(document, out, force=force)

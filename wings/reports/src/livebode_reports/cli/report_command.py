@@ -5,31 +5,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
-from livebode.cli import Entry, Json, ReportLanguage, results_directory
+from livebode.cli import Entry, Json, ReportLanguage, results_directory, with_keys
 from livebode.estimates import kind_of
 from livebode.locations import location
-from livebode_reports.cli.report_options import (
-    Appendix,
-    Ask,
-    Company,
-    Conditions,
-    Customer,
-    LogoFile,
-    Machine,
-    Operator,
-    PaperSize,
-    SerialNumber,
-    Template,
-    header,
-)
+from livebode_reports.cli.report_options import FIRST_PAGE, Appendix, Ask, Template, header
 
 _NOT_ALL_MET = 4
 
 
+@with_keys(report=FIRST_PAGE)
 def report_command(
     directory: Annotated[
         Path, typer.Argument(metavar="RUN", help="Run directory; the run need not be finished.", parser=location)
@@ -48,14 +36,8 @@ def report_command(
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace an existing report at --out.")] = False,
     template: Template = None,
-    machine: Machine = None,
-    serial_number: SerialNumber = None,
-    operator: Operator = None,
-    company: Company = None,
-    customer: Customer = None,
-    conditions: Conditions = None,
-    logo: LogoFile = None,
-    paper: PaperSize = None,
+    *,
+    sections: dict[str, dict[str, Any]],
     language: ReportLanguage = None,
     entry: Entry = None,
     ask: Ask = False,
@@ -81,11 +63,7 @@ def report_command(
     from livebode_reports.kinds import rule_of
 
     run = RunRecord.open(directory, on_damage=lambda _: None, matrix=True, entry=entry)
-    options = {
-        "machine": machine, "serial_number": serial_number, "operator": operator, "company": company,
-        "customer": customer, "conditions": conditions, "logo": logo, "paper": paper,
-    }  # fmt: skip
-    first = header(recorded_report(run.summary), template, ask, options)
+    first = header(recorded_report(run.summary), template, ask, sections.get("report", {}))
     if check and not first.limits:
         raise _no_limits()
     if on is not None and (run.is_matrix or entry is not None):

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from livebode.cli import key_help
 from livebode.core import UsageError
 
 if TYPE_CHECKING:
@@ -21,44 +20,12 @@ _ASKED = {
 }  # fmt: skip
 
 
-def _text(text: str | None) -> str | None:
-    if text is not None and (len(text) > _LETTERS_MAX or not text.isprintable()):
-        raise UsageError(
-            "unreadable",
-            f"a text for the first page has more than {_LETTERS_MAX} letters, or one that cannot be printed",
-            "shorten it to one line",
-            value=text[:_LETTERS_MAX],
-        )
-    return text
-
-
-def _option(key: str) -> Any:
-    names = "--" + key.replace("_", "-")
-    return typer.Option(names, metavar="TEXT", callback=_text, help=key_help(f"report.{key}"))
-
-
-def _paper(name: str | None) -> str | None:
-    papers = ("a4", "letter")
-    if name is not None and name not in papers:
-        raise UsageError(
-            "not-one-of",
-            f"--paper={name!r} is not one of the sizes",
-            f"choose {', '.join(papers)}",
-            argument="--paper", value=name, allowed=list(papers),
-        )  # fmt: skip
-    return name
-
-
-Machine = Annotated[str | None, _option("machine")]
-SerialNumber = Annotated[str | None, _option("serial_number")]
-Operator = Annotated[str | None, _option("operator")]
-Company = Annotated[str | None, _option("company")]
-Customer = Annotated[str | None, _option("customer")]
-Conditions = Annotated[str | None, _option("conditions")]
-LogoFile = Annotated[Path | None, typer.Option("--logo", metavar="FILE", help=key_help("report.logo"))]
-PaperSize = Annotated[
-    str | None, typer.Option("--paper", metavar="SIZE", callback=_paper, help="a4 or letter. \\[default: a4]")
-]
+FIRST_PAGE = {
+    **{key: ("--" + key.replace("_", "-"), "TEXT") for key in _ASKED},
+    "logo": ("--logo", "FILE"),
+    "paper": ("--paper", "SIZE"),
+}
+"""Option and metavar of each key of [report] that an option sets."""
 Template = Annotated[
     Path | None,
     typer.Option(
@@ -69,13 +36,13 @@ Ask = Annotated[bool, typer.Option("--ask", help="Ask on the terminal for what t
 Appendix = Annotated[bool, typer.Option("--appendix", help="Add the raw configuration and the versions.")]
 
 
-def header(recorded: ReportSection, template: Path | None, ask: bool, options: dict[str, Any]) -> ReportSection:
+def header(recorded: ReportSection, template: Path | None, ask: bool, specified: dict[str, Any]) -> ReportSection:
     """The first page and the limits: the options, then those asked for, the template, and the recorded ones.
 
     Raises
     ------
     ConfigError
-        If the template cannot be used.
+        If the template or the value of an option cannot be used.
     UsageError
         If --ask is used without a terminal.
     """
@@ -85,11 +52,32 @@ def header(recorded: ReportSection, template: Path | None, ask: bool, options: d
 
         used = read_template(template)
         header = header.over({name: getattr(used, name) for name in used.model_fields_set})
-    header = header.over(options)
-    return header.over(_answers(header)) if ask else header
+    header = header.over(_checked(specified))
+    return header.over(_checked(_answers(header))) if ask else header
 
 
-def _answers(header: ReportSection) -> dict[str, str | None]:
+def _checked(specified: dict[str, Any]) -> dict[str, Any]:
+    """The values as a file could have them."""
+    from pydantic import ValidationError
+
+    from livebode.configuration import ReportSection, report_error
+
+    for text in specified.values():
+        if isinstance(text, str) and (len(text) > _LETTERS_MAX or not text.isprintable()):
+            raise UsageError(
+                "unreadable",
+                f"a text for the first page has more than {_LETTERS_MAX} letters, or one that cannot be printed",
+                "shorten it to one line",
+                value=text[:_LETTERS_MAX],
+            )
+    try:
+        ReportSection.model_validate(specified)
+    except ValidationError as error:
+        raise report_error(error.errors(include_url=False)[0]) from None
+    return specified
+
+
+def _answers(header: ReportSection) -> dict[str, str]:
     if not sys.stdin.isatty():
         raise UsageError(
             "conflict",
@@ -99,6 +87,6 @@ def _answers(header: ReportSection) -> dict[str, str | None]:
         )
     missing = {name: words for name, words in _ASKED.items() if not getattr(header, name)}
     return {
-        name: _text(typer.prompt(f"{words} (Enter: none)", default="", show_default=False, err=True))
+        name: typer.prompt(f"{words} (Enter: none)", default="", show_default=False, err=True)
         for name, words in missing.items()
     }
