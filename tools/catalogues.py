@@ -30,7 +30,7 @@ from livebode.fitting.competitors import LAG, MODE, RESIDUAL, ExtendedModel
 from livebode.fitting.models import MODELS
 from livebode.monitoring import ALARMS, RETURNS, UNMONITORED
 from livebode.monitoring.sensitivity import DIRECTIONS
-from livebode.runtime.event_groups import CAUSES
+from livebode.runtime.run_counts import CAUSES
 
 ROOT = Path(__file__).parents[1]
 FOLDER = ROOT / "src/livebode/language/catalogues"

@@ -17,7 +17,7 @@ from hashlib import sha256
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-_OF_KERNEL = ("kernel", "native", "examples/drive/mps2")
+OF_KERNEL = ("kernel", "native", "examples/drive/mps2")
 """All that an object of kernel/ or native/ includes, apart from what belongs to its compiler."""
 _UNUSED_S = 7 * 86400.0
 
@@ -50,19 +50,21 @@ def compiled(compiler: str, flags: list[str], source: Path) -> Path:
         if done.returncode:
             raise RuntimeError(f"{' '.join(command)}\n{done.stdout}{done.stderr}")
 
-    return stored("\0".join([_version(compiler), _state_of_kernel(), *command]), make)
+    return stored("\0".join([version(compiler), state(*OF_KERNEL), *command]), make)
 
 
 @cache
-def _version(compiler: str) -> str:
-    return subprocess.run([compiler, "--version"], capture_output=True, text=True, check=True).stdout
+def version(program: str) -> str:
+    """What a program prints about its version."""
+    return subprocess.run([program, "--version"], capture_output=True, text=True, check=True).stdout
 
 
 @cache
-def _state_of_kernel() -> str:
+def state(*folders: str) -> str:
+    """Hash of all sources in C and files of CMake in these folders of the repository."""
     state = sha256()
-    for name in _OF_KERNEL:
-        for path in sorted((ROOT / name).rglob("*.[ch]")):
+    for path in sorted(path for name in folders for path in (ROOT / name).rglob("*")):
+        if path.suffix in (".c", ".h", ".cmake") or path.name == "CMakeLists.txt":
             state.update(b"%s\0%d\0" % (str(path).encode(), path.stat().st_size) + path.read_bytes())
     return state.hexdigest()
 

@@ -225,7 +225,7 @@ def test_a_record_is_logged_from_its_beginning_over_its_segments_to_its_end(
     closed = [i for i, line in enumerate(text) if line.startswith("livebode.records.segments.shelf: ")]
     assert begun < closed[0] < closed[-1] < ended
     assert len(closed) >= 4
-    (event,) = [line for line in text[begun:ended] if line.startswith("livebode.runtime.stream: ")]
+    (event,) = [line for line in text[begun:ended] if line.startswith("livebode.runtime.run_loop: ")]
     assert "not finite" in event
 
 

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from livebode.cli.visible import visible
+from livebode.cli.frames import visible
 from tests.support.command import livebode, signals
 from tests.support.terminals import on_terminal
 

@@ -6,11 +6,13 @@ import shutil
 import signal
 import subprocess
 from concurrent.futures import ThreadPoolExecutor
+from hashlib import sha256
 from pathlib import Path
 
 import pytest
 
-from tools.stored import compiled
+from livebode.kernel import instruction_sets
+from tools.stored import OF_KERNEL, compiled, state, stored, version
 
 ROOT = Path(__file__).parents[2]
 KERNEL, NATIVE = ROOT / "kernel", ROOT / "native"
@@ -77,11 +79,19 @@ def build(directory: Path, compiler: str, *flags: str, dispatch: bool = X86, spe
 
 
 def program(directory: Path, compiler: str, objects: list[Path], name: str, *flags: str, runner: str = "") -> str:
+    """What a program prints; one that has run with the same objects on such a processor is not run again."""
     source = PROGRAMS[name] / "tests" / f"{name}.c"
     include = *INCLUDES, f"-I{KERNEL / 'tests'}"
-    # Most of what the program itself does is hashing, which takes long where no compiler optimises it.
-    run(compiler, *WARNINGS, "-O1", *flags, *include, source, *objects, "-o", directory / name)
-    return run(*([runner] if runner else []), directory / name)
+
+    def make(file: Path) -> None:
+        # Most of what the program itself does is hashing, which takes long where no compiler optimises it.
+        run(compiler, *WARNINGS, "-O1", *flags, *include, source, *objects, "-o", directory / name)
+        file.write_text(run(*([runner] if runner else []), directory / name), encoding="utf-8")
+
+    content = sha256(b"".join(file.read_bytes() for file in objects)).hexdigest()
+    versions = [version(one) for one in (compiler, runner) if one]
+    key = [name, *versions, state(*OF_KERNEL), content, *flags, *instruction_sets()]
+    return stored("\0".join(key), make).read_text(encoding="utf-8")
 
 
 Built = tuple[str, Path, list[Path]]

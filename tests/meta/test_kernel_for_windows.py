@@ -5,6 +5,7 @@ There are no headers and libraries of Windows here: the few functions of C are d
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import shutil
@@ -12,6 +13,8 @@ import subprocess
 from pathlib import Path
 
 import pytest
+
+from tools.stored import state, stored, version
 
 ROOT = Path(__file__).parents[2]
 PROJECT = "cmake_minimum_required(VERSION 3.20)\nproject(all C)\n" + "".join(
@@ -58,25 +61,34 @@ def run(*command: str | Path) -> str:
     return done.stdout
 
 
-def test_the_c_compiles_for_windows_with_vectors_and_needs_only_what_windows_has(clang: str, tmp_path: Path) -> None:
+def libraries(clang: str, folder: Path) -> dict[str, str]:
+    """What the build prints, the names of its libraries and their symbols."""
     archiver, names = (run(clang, f"-print-prog-name={name}").strip() for name in ("llvm-lib", "llvm-nm"))
-    (tmp_path / "clang-cl").symlink_to(clang)
-    (tmp_path / "include").mkdir()
+    (folder / "clang-cl").symlink_to(clang)
+    (folder / "include").mkdir()
     for name, text in (("string.h", STRING), ("math.h", MATH)):
-        (tmp_path / "include" / name).write_text(text)
-    (tmp_path / "toolchain.cmake").write_text(TOOLCHAIN.format(folder=tmp_path, archiver=archiver))
-    (tmp_path / "CMakeLists.txt").write_text(PROJECT)
-    run("cmake", "-G", "Ninja", "-S", tmp_path, "-B", tmp_path / "build", "-DCMAKE_BUILD_TYPE=None",
-        f"-DCMAKE_TOOLCHAIN_FILE={tmp_path / 'toolchain.cmake'}")  # fmt: skip
-    printed = run("cmake", "--build", tmp_path / "build", "--parallel", "2")
-    assert "warning" not in printed
-    libraries = sorted((tmp_path / "build").rglob("*.lib"))
-    assert [library.name for library in libraries] == [
-        "livebode_kernel.lib",
-        "livebode_native.lib",
-        "livebode_axis.lib",
-    ]
-    symbols = run(names, *libraries)
+        (folder / "include" / name).write_text(text)
+    (folder / "toolchain.cmake").write_text(TOOLCHAIN.format(folder=folder, archiver=archiver))
+    (folder / "CMakeLists.txt").write_text(PROJECT)
+    run("cmake", "-G", "Ninja", "-S", folder, "-B", folder / "build", "-DCMAKE_BUILD_TYPE=None",
+        f"-DCMAKE_TOOLCHAIN_FILE={folder / 'toolchain.cmake'}")  # fmt: skip
+    printed = run("cmake", "--build", folder / "build", "--parallel", "2")
+    built = sorted((folder / "build").rglob("*.lib"))
+    return {
+        "printed": printed,
+        "libraries": " ".join(library.name for library in built),
+        "symbols": run(names, *built),
+    }
+
+
+def test_the_c_compiles_for_windows_with_vectors_and_needs_only_what_windows_has(clang: str, tmp_path: Path) -> None:
+    # All that what is built depends on; the same is not built again.
+    key = [state("kernel", "native", "simulation"), version(clang), version("cmake"), PROJECT, TOOLCHAIN, STRING, MATH]
+    file = stored("\0".join(key), lambda file: file.write_text(json.dumps(libraries(clang, tmp_path))))
+    built = json.loads(file.read_text())
+    assert "warning" not in built["printed"]
+    assert built["libraries"] == "livebode_kernel.lib livebode_native.lib livebode_axis.lib"
+    symbols = built["symbols"]
     for found in ("lb_sdft64_kernel_avx512", "lb_lines_avx2", "lb_matrix_avx2", "lb_two_masses_advance_avx512"):
         assert re.search(rf" [RT] {found}$", symbols, re.M), found
     missing = {name for name in re.findall(r"^ +U (\S+)$", symbols, re.M) if not name.startswith("lb_")}

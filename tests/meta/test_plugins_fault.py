@@ -173,7 +173,7 @@ def test_without_the_wing_control_a_run_has_its_report_and_its_page(
     assert "a model is tested by the wing control, which is not installed; install the wing control" in tested.err
     serve = """
 import sys
-sys.modules["livebode_control"] = None
+sys.modules["livebode_control"] = sys.modules["livebode_matrix"] = None
 from pathlib import Path
 from livebode.dashboard import Dashboard, ServerSettings
 dashboard = Dashboard(ServerSettings("127.0.0.1", 0))
@@ -188,7 +188,7 @@ with dashboard:
         with Tab(browser, server.stdout.readline().strip()) as tab:
             tab.until("bode.drawn.measured")
             assert tab.page.locator("#bode-curves").count() == 1
-            assert tab.page.locator("[id*=what-if]").count() == 0
+            assert tab.page.locator("[id*=what-if], [id*=matrix]").count() == 0
             assert tab.page.request.get(urljoin(tab.page.url, "/api/loop?axis=0")).status == 404
             assert tab.wrong == []
         server.communicate()

@@ -13,7 +13,7 @@ from livebode.core import Lines
 from livebode.estimation import Settings
 from livebode.excitation import multisine
 from livebode.preparation import AlignedLog, early_spikes
-from livebode.preparation.transients import leading_transient
+from livebode.preparation._steady import leading_transient
 from livebode.records import RunRecord
 from livebode.sources import open_log
 from tests.support.command import livebode, write_parquet

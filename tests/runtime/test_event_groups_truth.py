@@ -19,7 +19,7 @@ from livebode.estimation import Settings, Tracker
 from livebode.records import RunRecord, each_event, event_counts, query
 from livebode.records.grouped_events import event_rows
 from livebode.runtime import Document
-from livebode.runtime.event_groups import AT_ONCE, CAUSES, EXACT_MAX, QUIET_S, REPORT_S, EventGroups
+from livebode.runtime.run_counts import AT_ONCE, CAUSES, EXACT_MAX, QUIET_S, REPORT_S, EventGroups
 from livebode_reports.events import EventSummary
 from tests.support.runs import record
 

@@ -12,7 +12,7 @@ import numpy as np
 from livebode.configuration import RecordSection
 from livebode.core import Block, Channel, Lines
 from livebode.estimation import Settings, Tracker
-from livebode.runtime.event_groups import REPEATS_MAX
+from livebode.runtime.run_counts import REPEATS_MAX
 from tests.support.runs import record
 
 RATE_HZ, WINDOW, HOP, BLOCK = 1000.0, 50, 25, 5

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from livebode import Responses, learn
 from livebode.analysis import mean_of
 from livebode.configuration import Axis, ReadyCondition
-from livebode.core import Block, Channel, ConfigError, Event, Lines, SpectraLayout
+from livebode.core import Block, Channel, ConfigError, Event, Lines, RecordError, SpectraLayout
 from livebode.monitoring import ALARMS
 from livebode.preparation.followers import check_spectra
 from livebode.records import RunRecord
@@ -235,14 +235,14 @@ def test_several_recordings_of_an_adjusted_machine_are_those_of_the_healthy_one(
     assert "Not assessed for 6.2 s: the machine was not ready." in [finding.text for finding in found]
 
 
-def test_a_run_of_an_earlier_version_was_always_ready(tmp_path: Path) -> None:
+def test_a_run_without_the_column_of_readiness_is_refused(tmp_path: Path) -> None:
     record = ran(tmp_path / "run", machine(0.0))
-    written, path = record.responses(), record.path / "responses.parquet"
+    assert record.responses().ready.all()
+    path = record.path / "responses.parquet"
     pq.write_table(pq.read_table(path).drop_columns("ready"), path, compression="lz4")
     describe(record.path, record.path)
-    before = RunRecord.open(record.path).responses()
-    assert before.ready.all()
-    assert same(before, written)
+    with refused(RecordError, "unexpected-content", columns=pq.read_table(path).column_names):
+        RunRecord.open(record.path).responses()
 
 
 class StopError(Exception):

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from livebode.sources import Dialect
 from livebode.sources.cells import CellKind
-from livebode.sources.rows import RowError, RowReader
+from livebode.sources.delimited import RowError, RowReader
 from livebode.tables import NO_MOMENT
 
 CELLS = st.one_of(

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
-from livebode.cli.band import parsed_band
-from livebode.cli.options import Json
+from livebode.cli.options import Json, parsed_band
 from livebode.cli.section_options import with_keys
 from livebode.core import UsageError
 from livebode.estimates import kind_of, rule

@@ -1,4 +1,4 @@
-"""Text in frames for a terminal, as the help and the errors of the command line have it.
+"""Text for a terminal: in frames, as help and errors have it, and with its control characters made visible.
 
 Rich draws such frames too, but takes longer to load than most commands take to fail.
 """
@@ -6,6 +6,7 @@ Rich draws such frames too, but takes longer to load than most commands take to 
 from __future__ import annotations
 
 import os
+import re
 import textwrap
 from collections.abc import Iterable, Iterator
 from typing import TextIO
@@ -16,6 +17,10 @@ _END = "\x1b[0m"
 _ASCII = str.maketrans("╭╮╰╯─│", "++++-|")
 _TEXT_MINIMUM = 24
 """Columns of a text beside its name; with fewer it is below."""
+
+
+# Also characters that change the direction of writing: they can disguise a text.
+_CONTROL = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069]")
 
 
 def terminal_width(stream: TextIO | None) -> int:
@@ -31,6 +36,15 @@ def has_colours(stream: TextIO | None) -> bool:
     """Whether it is a terminal that shows colours."""
     allowed = os.name == "posix" and "NO_COLOR" not in os.environ and os.environ.get("TERM") != "dumb"
     return stream is not None and stream.isatty() and allowed
+
+
+def visible(text: str) -> str:
+    r"""Replace control characters, except new lines and tabs, by JSON escapes.
+
+    >>> visible("belt\x1b[2J\u202e ok")
+    'belt\\u001b[2J\\u202e ok'
+    """
+    return _CONTROL.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
 
 
 def printable(text: str, stream: TextIO | None) -> str:

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from logging.handlers import RotatingFileHandler
 from pathlib import Path
 
-from livebode.cli.visible import visible
+from livebode.cli.frames import visible
 from livebode.core import not_written
 
 FILE_BYTES_MAX = 16 << 20

@@ -6,20 +6,32 @@ import os
 import sys
 import threading
 from importlib import import_module
+from importlib.util import find_spec
 from math import isnan
 from pathlib import Path
 from shutil import get_terminal_size
 from typing import TYPE_CHECKING, Any
 
-from livebode.cli.picture_support import can_draw, tell_how_to_draw
 from livebode.cli.terminal import is_terminal, print_drawn
-from livebode.core import RunClock, counted, moment, moments_by
+from livebode.core import RunClock, counted, install_command, moment, moments_by
 from livebode.estimates import rule
 from livebode.locations import original
 
 if TYPE_CHECKING:
     from livebode.fitting import CommonPoles, Fit
     from livebode.runtime import Estimate, Outcome, SingleResponse
+
+
+def can_draw() -> bool:
+    """Whether Matplotlib is installed."""
+    return find_spec("matplotlib") is not None
+
+
+def tell_how_to_draw() -> None:
+    """Print how to get pictures, where there are none."""
+    if not can_draw():
+        print(f"no pictures, because Matplotlib is not installed; run {install_command('plots')}")
+
 
 _ALARMS_SHOWN = 8
 _ONE_AT_A_TIME = threading.Lock()

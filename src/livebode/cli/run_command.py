@@ -6,8 +6,7 @@ from typing import Annotated, Any
 
 import typer
 
-from livebode.cli.band import Band
-from livebode.cli.options import Json, Port, Serve
+from livebode.cli.options import Band, Json, Port, Serve
 from livebode.cli.section_options import with_keys
 from livebode.core import UsageError
 from livebode.locations import location

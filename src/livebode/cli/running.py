@@ -15,11 +15,10 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from livebode.cli import terminal
-from livebode.cli.band import parsed_band
 from livebode.cli.failures import exit_code_of
 from livebode.cli.notices import NoticePrinter
-from livebode.cli.picture_support import tell_how_to_draw
-from livebode.cli.pictures import draw, load_beside, tracked_amount
+from livebode.cli.options import parsed_band
+from livebode.cli.pictures import draw, load_beside, tell_how_to_draw, tracked_amount
 from livebode.cli.remote import recorded_at
 from livebode.configuration import Axes, Axis, ConfigurationFile, ServeSection
 from livebode.core import ConfigError, LocationError, UsageError

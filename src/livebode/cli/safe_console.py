@@ -9,7 +9,7 @@ from rich.console import Console, ConsoleOptions, RenderableType
 from rich.segment import Segment
 from rich.text import Text
 
-from livebode.cli.visible import visible
+from livebode.cli.frames import visible
 
 
 class SafeConsole(Console):

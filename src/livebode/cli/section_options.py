@@ -20,13 +20,13 @@ from livebode.configuration import documented
 
 _SECTIONS = {
     "fit": "livebode.configuration.fit_section:FitSection",
-    "lines": "livebode.configuration.lines_section:LinesSection",
-    "monitoring": "livebode.configuration.monitoring_section:MonitoringSection",
+    "lines": "livebode.configuration.measurement_sections:LinesSection",
+    "monitoring": "livebode.configuration.machine_sections:MonitoringSection",
     "report": "livebode.configuration.report_section:ReportSection",
-    "serve": "livebode.configuration.serve_section:ServeSection",
-    "signals": "livebode.configuration.signals_section:SignalsSection",
+    "serve": "livebode.configuration.output_sections:ServeSection",
+    "signals": "livebode.configuration.measurement_sections:SignalsSection",
     "source": "livebode.sources.live.settings:SourceKeys",
-    "tracking": "livebode.configuration.tracking_section:TrackingSection",
+    "tracking": "livebode.configuration.measurement_sections:TrackingSection",
 }
 _LIMITS = {"gt": "x>{}", "ge": "x>={}", "lt": "x<{}", "le": "x<={}"}
 _TYPES = {"bool": bool, "Path": Path, "File": Path, "int": int, "float": float, "Positive": float}

@@ -11,11 +11,11 @@ import sys
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, TextIO, cast
 
-from livebode.cli.frames import has_colours, printable, terminal_width
-from livebode.cli.visible import visible
+from livebode.cli.frames import has_colours, printable, terminal_width, visible
 
 if TYPE_CHECKING:
     from rich.console import Console
+
 
 _COLOUR = re.compile("(\x1b\\[[0-9;]*m)")
 

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from livebode.configuration._fit_settings import check_fit
 from livebode.configuration.axis import Axis
+from livebode.configuration.fit_section import check_fit
 from livebode.configuration.toml_file import parse_table, read_bytes, shortened
 from livebode.core import ConfigError, LivebodeError
 

@@ -8,24 +8,23 @@ from typing import Annotated, Any, TypeVar
 from pydantic import BaseModel, Field, ValidationError
 from pydantic_core import ErrorDetails
 
-from livebode.configuration.experiments_section import ExperimentsSection
 from livebode.configuration.fit_section import FitSection
-from livebode.configuration.lines_section import LinesSection
 from livebode.configuration.loop_section import LoopSection
-from livebode.configuration.machine_section import MachineSection
-from livebode.configuration.monitoring_section import MonitoringSection
-from livebode.configuration.motion_section import MotionSection
-from livebode.configuration.orders_section import OrdersSection
-from livebode.configuration.output_only_section import OutputOnlySection
+from livebode.configuration.machine_sections import MachineSection, MonitoringSection, OrdersSection
+from livebode.configuration.measurement_sections import (
+    ExperimentsSection,
+    LinesSection,
+    MotionSection,
+    OutputOnlySection,
+    SignalsSection,
+    TrackingSection,
+)
+from livebode.configuration.output_sections import RecordSection, ServeSection
 from livebode.configuration.publish_section import PublishSection, check_publish
 from livebode.configuration.ready import ReadyCondition, ready_condition
-from livebode.configuration.record_section import RecordSection
 from livebode.configuration.report_section import ReportSection, report_error
 from livebode.configuration.section import ConfigurationSection
-from livebode.configuration.serve_section import ServeSection
-from livebode.configuration.signals_section import SignalsSection
 from livebode.configuration.toml_file import one_line, read_table, shortened
-from livebode.configuration.tracking_section import TrackingSection
 from livebode.core import ConfigError, nearest_name
 from livebode.estimates import MATRIX, RESPONSE, rule
 from livebode.sources import live

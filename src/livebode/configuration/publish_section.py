@@ -1,18 +1,82 @@
-"""[[publish]]: where events and results of a run are sent."""
+"""[[publish]]: receivers of events and results, their kinds, and the text of a message."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from string import Formatter
+from typing import Annotated, Literal
 from urllib.parse import urlsplit
 
 from pydantic import AfterValidator, Field
 
-from livebode.configuration.message_template import check_template
 from livebode.configuration.section import ConfigurationSection, File
-from livebode.configuration.sink_kind import Events, Part
-from livebode.core import ConfigError
+from livebode.core import ConfigError, nearest_name
 from livebode.plugins import named
+
+NAMES = ("axis", "machine", "run", "kind", "priority", "message", "time", "sample", "value", "unit")
+"""What a template may contain; the how-to page on connections explains each."""
+
+
+def check_template(template: str) -> str:
+    """The template; ValueError for a name that is not one of `NAMES`, or anything but names between braces.
+
+    >>> check_template("{axis}: {message} ({value} {unit})")
+    '{axis}: {message} ({value} {unit})'
+    """
+    try:
+        parts = list(Formatter().parse(template))
+    except ValueError as error:
+        raise ValueError(f"has braces that do not fit together ({error}); write {{{{ for a brace") from None
+    for _, name, form, conversion in parts:
+        if name is None:
+            continue
+        if name not in NAMES:
+            raise ValueError(f"has the name {name!r}: {nearest_name(name, NAMES, 'Names')}")
+        if form or conversion:
+            raise ValueError(f"has a format for {name}, and only {{{name}}} is possible")
+    return template
+
+
+def filled(template: str, values: Mapping[str, str]) -> str:
+    """The template with the values of its names.
+
+    >>> filled("{axis}: {message}", {"axis": "x", "message": "{axis} is text here"})
+    'x: {axis} is text here'
+    """
+    return "".join(text + (values[name] if name else "") for text, name, _, _ in Formatter().parse(template))
+
+
+Part = Literal["parameters", "responses", "status"]
+Events = Literal["all", "alarms", "high", "medium", "low", "info"]
+
+
+@dataclass(frozen=True)
+class SinkKind:
+    """A kind of receiver.
+
+    Attributes
+    ----------
+    sink
+        "module:name" of the class, a `SinkConnection`; its module imports its library when a sink is created.
+    ports
+        The schemes of its URL, each with its usual port; None where the URL must name the port.
+    keys
+        Keys of [[publish]] that it has, in addition to those of every kind.
+    events, values
+        What it sends by default.
+    serves
+        Whether it is a server of livebode at that URL, which others read.
+    """
+
+    sink: str
+    ports: Mapping[str, int | None]
+    keys: frozenset[str]
+    events: tuple[Events, ...] = ("all",)
+    values: tuple[Part, ...] = ("parameters", "status")
+    serves: bool = False
+
 
 _EVERY = {"kind", "name", "url", "timeout_s"}
 

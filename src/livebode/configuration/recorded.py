@@ -8,7 +8,7 @@ from pydantic import BaseModel, ValidationError
 
 from livebode.configuration.fit_section import FitSection
 from livebode.configuration.loop_section import LoopSection
-from livebode.configuration.machine_section import MachineSection
+from livebode.configuration.machine_sections import MachineSection
 from livebode.configuration.report_section import ReportSection
 from livebode.core import RecordError
 

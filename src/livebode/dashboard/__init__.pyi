@@ -24,4 +24,5 @@ from livebode.dashboard.plugin_pages import PluginPages as PluginPages
 from livebode.dashboard.plugin_pages import ShownRun as ShownRun
 from livebode.dashboard.quantities import Quantities as Quantities
 from livebode.dashboard.queries import json_object as json_object
+from livebode.dashboard.queries import moment as moment
 from livebode.dashboard.server_settings import ServerSettings as ServerSettings

@@ -16,7 +16,7 @@ from starlette.routing import BaseRoute, Route, WebSocketRoute
 from starlette.websockets import WebSocket
 
 from livebode import export
-from livebode.core import LivebodeError, RecordError, Responses, ServerError, remove_created
+from livebode.core import LivebodeError, Responses, ServerError, remove_created
 from livebode.dashboard import queries
 from livebode.dashboard.access import COOKIE, SESSION_S, error_answer
 from livebode.dashboard.alarm_requests import Act, alarm_request
@@ -24,7 +24,6 @@ from livebode.dashboard.board import Board
 from livebode.dashboard.browser_socket import Client, serve_browser
 from livebode.dashboard.frames import frame
 from livebode.dashboard.guard import Guard, body
-from livebode.dashboard.matrix_group import matrix_answer
 from livebode.dashboard.past import Past
 from livebode.dashboard.plugin_pages import Answer, PluginPages, ShownRun, files_of_additions, page_additions
 from livebode.dashboard.queries import SavedChange
@@ -106,7 +105,6 @@ def _page_routes(pages: _Pages) -> list[BaseRoute]:
         Route("/api/past", pages.past),
         Route("/api/moment", pages.moment),
         Route("/api/signals", pages.signals),
-        Route("/api/matrix", pages.matrix),
         Route("/api/export", pages.export),
         *(Route(f"/api/{act}", partial(pages.act, act), methods=["POST"]) for act in get_args(Act)),
         Route("/api/saved", pages.saved, methods=["GET"]),
@@ -194,19 +192,10 @@ class _Pages:
         if (state := self._asked_state(request)) is None:
             return _unknown()
         assert state.quantities is not None  # the run has begun
-        run = ShownRun(state.axis, Past.of(state), state.quantities, dict(state.summary))
+        group, states = state.group, self._board.states
+        units = [[_unit(states[group.axis(o, i)]) for i in group.inputs] for o in group.outputs] if group else []
+        run = ShownRun(state.axis, Past.of(state), state.quantities, dict(state.summary), group, units)
         return JSONResponse(await self._board.elsewhere(answer, run, request.query_params))
-
-    async def matrix(self, request: Request) -> Response:
-        """The newest matrix of the run that an axis is an entry of, or the one nearest to a time."""
-        if (state := self._asked_state(request)) is None:
-            return _unknown()
-        group, time_s = state.group, queries.moment(request.query_params)
-        if group is None:
-            raise RecordError("no-matrix", "this run has one response and no matrix", Message("reload the page"))
-        responses = await self._board.elsewhere(group.at, _directory(state), state.readable, time_s)
-        units = [[_unit(self._board.states[group.axis(o, i)]) for i in group.inputs] for o in group.outputs]
-        return JSONResponse(matrix_answer(group, responses, units))
 
     async def export(self, request: Request) -> Response:
         """Responses of a span of time as a file; a single response if the span has no length."""

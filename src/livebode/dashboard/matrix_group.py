@@ -1,4 +1,4 @@
-"""Matrix runs on the page: their entries, each of which is an axis, live or recorded, and the answer with a matrix."""
+"""Matrix runs on the page: their entries, each of which is an axis, live or recorded, and their matrices."""
 
 from __future__ import annotations
 
@@ -9,10 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from livebode.analysis import LIVE_VALUES_MAX, Overview
-from livebode.core import REASONS, MatrixResponses, ServerError
+from livebode.core import MatrixResponses, ServerError
 from livebode.dashboard.hub import Hub
 from livebode.records import RunRecord, entry_summary
 from livebode.runtime import Document, RunEnded, RunStarted
@@ -101,48 +100,6 @@ def _better(best: MatrixResponses | None, part: MatrixResponses, time_s: float |
     if best is not None and abs(best.time_s[0] - time_s) <= abs(part.time_s[nearest] - time_s):
         return best
     return part[nearest : nearest + 1]
-
-
-_SIGMAS = 3.0  # of the bounds, as of all curves of the page
-
-
-def matrix_answer(group: MatrixGroup, matrices: MatrixResponses, units: list[list[str]]) -> dict[str, Any]:
-    """Plain data of one matrix; what is not known is None.
-
-    `reach` is 3σ/|G|; `reasons` has for each input the number of lines at which its column is invalid, by reason.
-    """
-    matrix = matrices[-1:]
-    value, sigma = matrix.value[0], matrix.sigma[0]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        level, reach = 20 * np.log10(np.abs(value)), _SIGMAS * sigma / np.abs(value)
-        singular = 20 * np.log10(matrix.singular_values[0])
-
-    def entry(o: int, i: int) -> dict[str, Any]:
-        return {"db": _plain(level[:, o, i]), "reach": _plain(reach[:, o, i]), "unit": units[o][i]}
-
-    entries = [[entry(o, i) for i in range(len(matrix.inputs))] for o in range(len(matrix.outputs))]
-    return group.plain() | {
-        "frequency_hz": matrix.frequency_hz.tolist(),
-        "time_s": float(matrix.time_s[0]),
-        "dof": _number(matrix.dof[0]),
-        "entries": entries,
-        "reasons": [_counts(matrix.reason[0, :, i]) for i in range(len(matrix.inputs))],
-        "singular_db": [_plain(singular[:, k]) for k in range(singular.shape[1])],
-        "condition": _plain(matrix.condition[0]),
-        "coherence": [_plain(matrix.coherence[0, :, o]) for o in range(len(matrix.outputs))],
-    }
-
-
-def _counts(reason: NDArray[np.int8]) -> dict[str, int]:
-    return {word: n for k, word in enumerate(REASONS) if k and (n := int(np.count_nonzero(reason == k)))}
-
-
-def _plain(values: NDArray[np.float64]) -> list[float | None]:
-    return [_number(v) for v in values]
-
-
-def _number(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
 
 
 class MatrixHub:

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from starlette.routing import BaseRoute
 
     from livebode.dashboard.board import Board
+    from livebode.dashboard.matrix_group import MatrixGroup
     from livebode.dashboard.past import Past
     from livebode.dashboard.quantities import Quantities
 
@@ -45,12 +46,30 @@ class PluginPages(Protocol):
 
 
 class ShownRun(NamedTuple):
-    """The run of an axis of the page: its record, its quantities, and the run.json that it has or will have."""
+    """The run of an axis of the page.
+
+    Attributes
+    ----------
+    axis
+        The axis.
+    past
+        Its record.
+    quantities
+        Its quantities.
+    summary
+        The run.json that it has or will have.
+    group
+        The matrix run of which it is an entry; None of any other run.
+    units
+        Units of the entries of the group, by output and input.
+    """
 
     axis: int
     past: Past
     quantities: Quantities
     summary: dict[str, Any]
+    group: MatrixGroup | None
+    units: list[list[str]]
 
 
 Answer = Callable[[ShownRun, Mapping[str, str]], dict[str, Any]]

@@ -1,6 +1,4 @@
 from livebode.estimation._welch import welch as welch
-from livebode.estimation.centre import Centre as Centre
-from livebode.estimation.estimators import Role as Role
 from livebode.estimation.hum import SECONDS_MIN as SECONDS_MIN
 from livebode.estimation.hum import Hum as Hum
 from livebode.estimation.hum import disturbed_lines as disturbed_lines
@@ -30,17 +28,19 @@ from livebode.estimation.spectra import SpectraRows as SpectraRows
 from livebode.estimation.spectra import check_instruction_set as check_instruction_set
 from livebode.estimation.spectra_tracker import NewestSpectra as NewestSpectra
 from livebode.estimation.spectra_tracker import SpectraTracker as SpectraTracker
+from livebode.estimation.stream_estimator import Centre as Centre
 from livebode.estimation.stream_estimator import Follower as Follower
+from livebode.estimation.stream_estimator import InputStatistics as InputStatistics
 from livebode.estimation.tracker import NOTHING as NOTHING
 from livebode.estimation.tracker import SuccessiveTrackers as SuccessiveTrackers
 from livebode.estimation.tracker import Tracker as Tracker
 from livebode.estimation.tracker import contains as contains
 from livebode.estimation.tracker_settings import DETECTION_LINES_MIN as DETECTION_LINES_MIN
 from livebode.estimation.tracker_settings import WINDOWS as WINDOWS
+from livebode.estimation.tracker_settings import Role as Role
 from livebode.estimation.tracker_settings import Settings as Settings
 from livebode.estimation.tracker_settings import default_hop as default_hop
 from livebode.estimation.tracker_settings import nearest_hop as nearest_hop
 from livebode.estimation.uneven import UnevenSpectra as UnevenSpectra
 from livebode.estimation.uneven import UnevenTracker as UnevenTracker
 from livebode.estimation.uneven import UnevenWindow as UnevenWindow
-from livebode.estimation.watch import InputStatistics as InputStatistics

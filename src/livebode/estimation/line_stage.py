@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from livebode.arrays import Complex, Flags, Floats
 from livebode.core import Channel, Event, PlantKinds, Responses, Stage, StatefulBase
 from livebode.estimation.detection import DetectionNoise, beyond
-from livebode.estimation.estimators import Role
 from livebode.estimation.movement import Movement
 from livebode.estimation.periodicity import Periodicity
 from livebode.estimation.periods import PeriodMoments
@@ -20,7 +19,7 @@ from livebode.estimation.products import power, times
 from livebode.estimation.quantities import LineEstimates
 from livebode.estimation.repeating import RepeatingVerdicts
 from livebode.estimation.spectra import Hann, SpectraRows, check_instruction_set
-from livebode.estimation.tracker_settings import Settings
+from livebode.estimation.tracker_settings import Role, Settings
 from livebode.kernel import (
     NOISE_LARGER,
     NOISE_MOVING,

@@ -9,12 +9,10 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Floats
 from livebode.core import Block, Emit, Event, Responses, Stage, StatefulBase, UsageError, hand_over, ignore
-from livebode.estimation.centre import Centre
 from livebode.estimation.nonperiodic_stage import NonPeriodicStage, Row
 from livebode.estimation.spectra import SpectraRows
-from livebode.estimation.stream_estimator import StreamEstimator, signals_of
+from livebode.estimation.stream_estimator import Centre, InputStatistics, StreamEstimator, signals_of
 from livebode.estimation.tracker_settings import Settings
-from livebode.estimation.watch import InputStatistics
 
 
 class NewestSamples(StatefulBase):

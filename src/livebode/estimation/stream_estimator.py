@@ -1,13 +1,53 @@
-"""Interface of what turns samples into responses; the common part of Tracker and SpectraTracker, with its counters."""
+"""What all trackers have in common: their interface, counters, the effective time, and checks of their input."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from typing import Any, Generic, Protocol, TypeVar
 
+import numpy as np
+from numpy.typing import NDArray
+
 from livebode.arrays import Floats, Integers
-from livebode.core import Block, Emit, Event, Responses, SignalError, Stateful, StatefulBase, ignore, same_rate
+from livebode.core import Block, Emit, Event, Responses, SignalError, Stage, Stateful, StatefulBase, ignore, same_rate
+from livebode.estimation.spectra import SpectraRows
 from livebode.estimation.tracker_settings import Settings
+from livebode.language import Message
+
+
+class Centre(StatefulBase):
+    """Scheduling signal at the centre of each window, (N − 1)/2 samples before its newest sample.
+
+    For an even N the centre is between two samples, and the result is their mean.
+    """
+
+    _stage = Stage("centre", 1)
+    _STATE = ("_past",)
+
+    def __init__(self, window: int) -> None:
+        self._early, self._late = window // 2, (window - 1) // 2
+        self._past = np.full(self._early, np.nan)
+
+    def restart(self) -> None:
+        self._past[:] = np.nan
+
+    def at(self, schedule: Floats | None, position: NDArray[np.int64]) -> Floats:
+        """Schedule at the centres of the windows that end at these positions of the next stretch, `schedule`.
+
+        NaN without a schedule.
+        """
+        if schedule is None:
+            return np.full(position.size, np.nan)
+        known = np.concatenate([self._past, schedule])
+        self._past = known[known.size - self._early :]
+        return np.asarray((known[position] + known[position + self._early - self._late]) / 2)
+
+
+_KINDS = {
+    "non-finite": Message("a sample is not finite"),
+    "implausible": Message("a sample is more than 1e8 times larger than all in the period before"),
+    "spike": Message("a sample differs strongly from the previous periods and is excluded"),
+}
 
 
 class StreamCounters(StatefulBase):
@@ -31,6 +71,69 @@ class StreamCounters(StatefulBase):
 
 
 W = TypeVar("W", bound=StreamCounters)
+
+
+class InputStatistics(StreamCounters):
+    """Counts and Events of a stream of Blocks."""
+
+    _stage = Stage("sample-counts", 1)
+
+    def __init__(self, events: list[Event], window: int) -> None:
+        super().__init__(events, _KINDS, -window)
+        self._window = window
+
+    def starts(self, block: Block) -> bool:
+        """Whether this block does not follow the previous samples; adds an Event where samples are missing."""
+        first = self._next < 0
+        missing = 0 if first else block.start - self._next
+        if missing < 0:
+            raise SignalError(
+                "repeated",
+                f"samples {block.start} to {self._next - 1} came twice",
+                "let blocks follow each other: drop what repeats",
+                first_sample=block.start,
+                last_sample=self._next - 1,
+            )
+        gap = not first and (missing > 0 or block.gap)
+        self._next = block.stop
+        self.counts["samples"] += len(block)
+        if gap:
+            self.counts["gaps"] += 1
+            self.counts["missing"] += missing
+            message = Message(
+                "an unknown number of samples is missing before sample {at_sample}", at_sample=block.start
+            )
+            if missing:
+                message = Message(
+                    "{missing_samples} samples are missing before sample {at_sample}",
+                    missing_samples=missing,
+                    at_sample=block.start,
+                )
+            self._exclude("gap", block, block.start, message, missing_samples=missing)
+        return first or gap
+
+    def count(self, block: Block, rows: SpectraRows) -> None:
+        """Count the excluded samples; one Event for all that are within a window of each other."""
+        excluded = {"non-finite": rows.not_finite, "implausible": rows.implausible, "spike": rows.spikes}
+        new: list[tuple[int, str]] = []
+        for kind, position in excluded.items():
+            if not position.size:
+                continue
+            self.counts[kind] += position.size
+            number = block.start + position
+            apart = np.diff(number, prepend=self._last[kind]) >= self._window
+            self._last[kind] = int(number[-1])
+            new += [(int(sample), kind) for sample in number[apart]]
+        for sample, kind in sorted(new):
+            self._exclude(kind, block, sample, _KINDS[kind])
+
+    def _exclude(self, kind: str, block: Block, sample: int, cause: str, **details: int) -> None:
+        message = Message(
+            "{what}; responses are invalid until a window of {window} samples is complete again",
+            what=cause,
+            window=self._window,
+        )
+        self._report(kind, block, sample, message, **details)
 
 
 class Follower(Stateful, Protocol):

@@ -10,16 +10,14 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Integers
 from livebode.core import Block, Emit, Event, Responses, Stage, StatefulBase, hand_over, ignore
-from livebode.estimation.centre import Centre
 from livebode.estimation.implausible import SpikeGate
 from livebode.estimation.line_stage import LineStage
 from livebode.estimation.repeating import RepeatingErrors
 from livebode.estimation.ripple import RippleSpeed, ripple_power
 from livebode.estimation.silence_search import HumSpan
 from livebode.estimation.spectra import LineSpectra
-from livebode.estimation.stream_estimator import StreamEstimator, signals_of
+from livebode.estimation.stream_estimator import Centre, InputStatistics, StreamEstimator, signals_of
 from livebode.estimation.tracker_settings import Settings
-from livebode.estimation.watch import InputStatistics
 
 NOTHING: Integers = np.zeros((0, 2), dtype=np.int64)
 """No stretch is set aside."""

@@ -12,12 +12,11 @@ from numpy.typing import NDArray
 from livebode.arrays import Complex, Flags, Floats
 from livebode.core import Lines, QuantityKind, f_quantile
 from livebode.estimation.detection import Groups, Interpolation
-from livebode.estimation.estimators import Role
 from livebode.estimation.hum import Neighbours, mains_of
 from livebode.estimation.periods import Moments
 from livebode.estimation.products import divided, power, times
 from livebode.estimation.spectra import after
-from livebode.estimation.tracker_settings import Settings
+from livebode.estimation.tracker_settings import Role, Settings
 from livebode.kernel import (
     REASONS,
     PeriodSpectra,

@@ -1,6 +1,8 @@
-from livebode.preparation._early_spikes import early_spikes as early_spikes
 from livebode.preparation._role_spectra import role_spectra as role_spectra
+from livebode.preparation._steady import early_spikes as early_spikes
 from livebode.preparation._steady import steady as steady
+from livebode.preparation._steady import transient_event as transient_event
+from livebode.preparation._steady import transient_periods as transient_periods
 from livebode.preparation._uneven_grid import uneven_grid as uneven_grid
 from livebode.preparation.aligned import AlignedLog as AlignedLog
 from livebode.preparation.aligned import SlipSearch as SlipSearch
@@ -34,8 +36,6 @@ from livebode.preparation.recordings import check_same as check_same
 from livebode.preparation.recordings import realisations as realisations
 from livebode.preparation.roles import ROLES as ROLES
 from livebode.preparation.roles import suspicions as suspicions
-from livebode.preparation.transients import transient_event as transient_event
-from livebode.preparation.transients import transient_periods as transient_periods
 from livebode.preparation.uneven_plan import check_uneven as check_uneven
 from livebode.preparation.uneven_plan import clock_facts as clock_facts
 from livebode.preparation.uneven_plan import uneven_event as uneven_event

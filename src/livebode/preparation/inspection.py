@@ -14,7 +14,7 @@ from livebode.core import Lines, LivebodeError, RecordingError, UsageError
 from livebode.estimation import nearest_hop
 from livebode.excitation import Excitation, pattern, recognise
 from livebode.locations import Location
-from livebode.preparation._steady import bounded
+from livebode.preparation._steady import EXAMINED_MIN, bounded
 from livebode.preparation._uneven_grid import measured_grid
 from livebode.preparation.contents import Contents, read_contents
 from livebode.preparation.followers import LIVE_RESPONSES_PER_S
@@ -22,7 +22,6 @@ from livebode.preparation.nonperiodic import suits_lpm
 from livebode.preparation.part import chosen_part
 from livebode.preparation.plan import SEARCHED, beginning
 from livebode.preparation.quiet import Quiet, look_for_hum
-from livebode.preparation.transients import EXAMINED_MIN
 from livebode.preparation.uneven_plan import clock_facts
 from livebode.sources import UNEVEN, ClockGroup, Log, Recording, Skipped, UnevenLog, log_of, open_file, uneven_log_of
 

@@ -12,9 +12,9 @@ import numpy as np
 from livebode.arrays import Floats
 from livebode.core import LivebodeError
 from livebode.excitation import recognise
+from livebode.preparation._role_spectra import DRIVING, NAMED_INPUT, NAMED_OUTPUT
 from livebode.preparation.contents import ChannelSummary, contents_of
 from livebode.preparation.plan import beginnings
-from livebode.preparation.quantity_names import DRIVING, NAMED_INPUT, NAMED_OUTPUT
 from livebode.sources import Log
 
 _SEARCHED = 1 << 18  # samples: enough for some periods of an excitation

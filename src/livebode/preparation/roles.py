@@ -13,8 +13,7 @@ from livebode.arrays import Complex, Floats
 from livebode.core import ANY_EXCITATION, Channel, SignalError
 from livebode.estimation import Role, Settings
 from livebode.language import Message
-from livebode.preparation._role_spectra import RoleSpectra, role_spectra
-from livebode.preparation.quantity_names import ChannelQuantities
+from livebode.preparation._role_spectra import ChannelQuantities, RoleSpectra, role_spectra
 
 _CHANCE = 1e-3  # probability that noise alone, at any line, is taken for a signal
 _LINES_MIN, _SLOPE_LINES = 4, 200  # fewer give no slope, more do not improve it

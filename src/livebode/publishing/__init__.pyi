@@ -1,5 +1,5 @@
 from livebode.configuration.publish_section import PublishSection as PublishSection
-from livebode.configuration.sink_kind import SinkKind as SinkKind
+from livebode.configuration.publish_section import SinkKind as SinkKind
 from livebode.publishing.messages import AxisValues as AxisValues
 from livebode.publishing.messages import EventMessage as EventMessage
 from livebode.publishing.messages import Measurement as Measurement

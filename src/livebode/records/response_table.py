@@ -33,9 +33,6 @@ RESPONSE_SCHEMA = Schema.of(
 response, sigma with its degrees of freedom, coherence of excitation and output, validity, coherence of excitation and
 input, weight in a mean, distortion, whether the machine was ready in the whole window. NaN for missing values."""
 
-EARLIER = RESPONSE_SCHEMA.names[:-1]
-"""Names of the columns of runs from before `signals.ready`: the machine was always ready."""
-
 RESPONSES = ColumnTable(RESPONSE_SCHEMA, ("first", "sample", "time_s", "schedule", "frequency_hz", "dof"))
 
 
@@ -66,14 +63,13 @@ def as_batch(responses: Responses) -> Table:
 def responses_in(table: Table, lines: Lines, found: Mapping[str, Any]) -> Responses:
     """The responses in complete rows of this table; `found` of run.json has quantity and unit."""
     shape = table.num_rows // len(lines), len(lines)
-    names = [name for name in RESPONSE_SCHEMA.names if name in table.column_names]
-    column: dict[str, Any] = {name: table[name].reshape(shape) for name in names}
+    column: dict[str, Any] = {name: table[name].reshape(shape) for name in RESPONSE_SCHEMA.names}
     value = np.empty(shape, dtype=np.complex128)
     value.real, value.imag = column["re"], column["im"]
     per_line = {name: column[name] for name in PER_LINE if name in column}
     per_line["weight"] = np.empty(shape, dtype=np.complex128)
     per_line["weight"].real, per_line["weight"].imag = column["weight_re"], column["weight_im"]
-    per_row = {name: column[name][:, 0] for name in PER_RESPONSE if name in column}
+    per_row = {name: column[name][:, 0] for name in PER_RESPONSE}
     named = {"quantity": found["quantity"], "unit": found["unit"]}
     return Responses(lines=lines, value=value, **per_line, **per_row, **named)
 

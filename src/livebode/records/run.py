@@ -37,7 +37,7 @@ from livebode.records.matrix_run import (
 )
 from livebode.records.matrix_table import COVARIANCE_SCHEMA, MatrixShape, entry_rows, matrices
 from livebode.records.matrix_table import SCHEMA as MATRIX_SCHEMA
-from livebode.records.response_table import EARLIER, RESPONSE_SCHEMA, responses_in
+from livebode.records.response_table import RESPONSE_SCHEMA, responses_in
 from livebode.records.segments import event_lines, reading
 from livebode.records.segments.damage import KIND
 from livebode.records.segments.json_lines import EVENTS
@@ -233,8 +233,8 @@ class RunRecord:
         """
         shape = self._matrix_shape
         rows, factors = self.tables("responses", size_bytes_max, span_s), self.tables("covariance", span_s=span_s)
-        responses = self._whole(rows, shape.response_rows, (MATRIX_SCHEMA.names,))
-        covariance = self._whole(factors, shape.covariance_rows, (COVARIANCE_SCHEMA.names,))
+        responses = self._whole(rows, shape.response_rows, MATRIX_SCHEMA.names)
+        covariance = self._whole(factors, shape.covariance_rows, COVARIANCE_SCHEMA.names)
         yield from map(self._with_units, matrices(responses, covariance, shape))
 
     def _with_units(self, responses: MatrixResponses) -> MatrixResponses:
@@ -291,10 +291,10 @@ class RunRecord:
         if self.is_matrix:
             raise entry_missing(str(self.path), self.summary)
         lines = self.lines
-        for table in self._whole(tables, len(lines), (RESPONSE_SCHEMA.names, EARLIER)):
+        for table in self._whole(tables, len(lines), RESPONSE_SCHEMA.names):
             yield responses_in(table, lines, self.found)
 
-    def _whole(self, tables: Iterator[Table], rows: int, columns: Collection[list[str]]) -> Iterator[Table]:
+    def _whole(self, tables: Iterator[Table], rows: int, columns: list[str]) -> Iterator[Table]:
         """The rows of whole responses, `rows` each, in parts of bounded size; RecordError if they are of no run."""
         remainder: Table | None = None
         for part in tables:
@@ -314,8 +314,8 @@ class RunRecord:
                 path=str(self.path),
             )
 
-    def _check_columns(self, table: Table, columns: Collection[list[str]]) -> None:
-        if table.schema.names not in columns:
+    def _check_columns(self, table: Table, columns: list[str]) -> None:
+        if table.schema.names != columns:
             raise RecordError(
                 "unexpected-content",
                 f"the responses in {str(self.path)!r} have unexpected columns",
@@ -342,7 +342,7 @@ class RunRecord:
             yield from rows
             return
         for table in rows:
-            self._check_columns(table, (MATRIX_SCHEMA.names,))
+            self._check_columns(table, MATRIX_SCHEMA.names)
             yield entry_rows(table, *self.selected)
 
     def _recorded_tables(

@@ -4,11 +4,9 @@ from livebode.runtime._demo import demo as demo
 from livebode.runtime._demo import demo_baseline as demo_baseline
 from livebode.runtime._run import run as run
 from livebode.runtime.axis_thread import AxisThread as AxisThread
-from livebode.runtime.baseline_comparison import BaselineComparison as BaselineComparison
-from livebode.runtime.baseline_comparison import no_effect as no_effect
+from livebode.runtime.change_detection import BaselineComparison as BaselineComparison
 from livebode.runtime.change_detection import ChangeDetection as ChangeDetection
-from livebode.runtime.destination import Destination as Destination
-from livebode.runtime.destination import Draw as Draw
+from livebode.runtime.change_detection import no_effect as no_effect
 from livebode.runtime.documents import Channels as Channels
 from livebode.runtime.documents import ClockSet as ClockSet
 from livebode.runtime.documents import Document as Document
@@ -29,6 +27,8 @@ from livebode.runtime.readiness import ENDED as ENDED
 from livebode.runtime.readiness import SUPPRESSED as SUPPRESSED
 from livebode.runtime.readiness import Readiness as Readiness
 from livebode.runtime.recorded_run import RecordedRun as RecordedRun
+from livebode.runtime.recorder import Destination as Destination
+from livebode.runtime.recorder import Draw as Draw
 from livebode.runtime.recorder import RecordInOnePiece as RecordInOnePiece
 from livebode.runtime.run_control import RunControl as RunControl
 from livebode.runtime.run_control import StoppedError as StoppedError

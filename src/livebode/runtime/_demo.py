@@ -10,10 +10,10 @@ from livebode.estimation import Settings, Tracker, plant_kinds
 from livebode.excitation import multisine
 from livebode.monitoring import Baseline, Monitor, learn_machine
 from livebode.runtime.change_detection import ChangeDetection
-from livebode.runtime.destination import Destination
 from livebode.runtime.estimate import Outcome
 from livebode.runtime.feed import Feed
 from livebode.runtime.fits import Fits
+from livebode.runtime.recorder import Destination
 from livebode.runtime.run_loop import RunLoop
 from livebode.runtime.single_response import SingleResponse
 from livebode.simulation import BeltAxis, Drive, Fault, Friction, Sensor, SimulatedAxis, Strokes, TensionLoss

@@ -7,9 +7,9 @@ import time
 from livebode.configuration import NOT_RECORDED, Axis, open_recordings
 from livebode.core import RunClock, moments_by
 from livebode.estimates import rule
-from livebode.runtime.destination import Destination
 from livebode.runtime.estimate import ExaminedRecording, Outcome
 from livebode.runtime.feed import Feed
+from livebode.runtime.recorder import Destination
 from livebode.runtime.run_control import RunControl
 from livebode.runtime.run_loop import RunLoop
 from livebode.runtime.summary import provenance

@@ -10,8 +10,8 @@ from livebode.configuration import Axis
 from livebode.core import ConfigError, LivebodeError
 from livebode.estimates import rule
 from livebode.runtime._run import run
-from livebode.runtime.destination import Destination
 from livebode.runtime.estimate import Outcome
+from livebode.runtime.recorder import Destination
 from livebode.runtime.run_control import RunControl, StoppedError
 from livebode.runtime.status import Status
 

@@ -19,7 +19,7 @@ from livebode.analysis import Overview
 from livebode.configuration import Axis
 from livebode.core import Block, Channel, ClockKind, Event, Responses, SignalError, Stateful, nearest_name
 from livebode.records import ColumnTable
-from livebode.runtime.baseline_comparison import BaselineComparison
+from livebode.runtime.change_detection import BaselineComparison
 from livebode.runtime.documents import Document
 from livebode.runtime.run_counts import RunCounts
 

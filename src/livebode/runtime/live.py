@@ -17,10 +17,10 @@ from livebode.language import Message
 from livebode.runtime import successors
 from livebode.runtime.clock_relation import ClockRelation
 from livebode.runtime.continuing import PreviousRun, StreamPosition, stream_position
-from livebode.runtime.destination import Destination
 from livebode.runtime.estimate import Estimate, Outcome
 from livebode.runtime.live_feed import LiveFeed
 from livebode.runtime.recorded_run import source_of
+from livebode.runtime.recorder import Destination
 from livebode.runtime.run_control import RunControl
 from livebode.runtime.run_loop import RunLoop
 from livebode.runtime.summary import provenance

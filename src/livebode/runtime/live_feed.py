@@ -9,10 +9,10 @@ from typing import Any
 from livebode.core import Block, Emit, Event
 from livebode.runtime.clock_relation import ClockRelation
 from livebode.runtime.continuing import PreviousRun, StreamPosition
-from livebode.runtime.event_groups import CAUSES
 from livebode.runtime.feed import Feed
 from livebode.runtime.recorder import Recorder
 from livebode.runtime.run_control import RunControl
+from livebode.runtime.run_counts import CAUSES
 from livebode.runtime.sender_numbers import SenderNumbers
 from livebode.runtime.shedding import LoadShedding
 from livebode.runtime.summary import recorded_live

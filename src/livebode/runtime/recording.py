@@ -27,8 +27,8 @@ from livebode.preparation import (
     window_in_doubt,
 )
 from livebode.records import content_sha256
-from livebode.runtime.destination import Destination
 from livebode.runtime.estimate import ExaminedRecording
+from livebode.runtime.recorder import Destination
 from livebode.runtime.single_response import SingleResponse
 from livebode.runtime.summary import RecordedSpan, dated, recorded
 from livebode.sources import Log, located

@@ -1,9 +1,10 @@
-"""RunLoop: one run, from its first sample to run.json, whatever is estimated from the samples."""
+"""RunLoop: one run, from its first sample to run.json, whatever is estimated from the samples; its Stream."""
 
 from __future__ import annotations
 
+import logging
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from math import gcd
@@ -13,17 +14,70 @@ from livebode.configuration import RecordSection
 from livebode.core import Block, Event, LivebodeError, SignalError
 from livebode.preparation import ChannelCheck, check_length
 from livebode.runtime.allocation import keep_freed_memory
-from livebode.runtime.destination import Destination
-from livebode.runtime.documents import Channels, ClockSet, RunEnded, RunStarted, TrackerResults
+from livebode.runtime.documents import Channels, ClockSet, Document, RunEnded, RunStarted, Subscriber, TrackerResults
 from livebode.runtime.estimate import Estimate, Outcome, RunContext
 from livebode.runtime.feed import Feed
-from livebode.runtime.recorder import WholeRecord
+from livebode.runtime.recorder import Destination, WholeRecord
 from livebode.runtime.run_control import StoppedError
-from livebode.runtime.run_counts import RunCounts
-from livebode.runtime.stream import Stream
+from livebode.runtime.run_counts import EventGroups, RunCounts
+from livebode.sources.live import KINDS
 
 if TYPE_CHECKING:
     from livebode.runtime.recorder import Recorder
+
+
+_URGENT = {"change", "backlog", "doubtful", "roles-doubtful", "window-doubtful", "baseline-unknown", "not-monitored"}
+_LOGGED_ELSEWHERE = {*KINDS, "configuration-applied", "configuration-refused"}
+_logger = logging.getLogger(__name__)
+
+
+class Stream:
+    """The one path from a run to its record and its subscribers.
+
+    Events go through `groups`, and are logged where their source has not done so.
+    """
+
+    def __init__(self, recorder: Recorder, subscribers: Sequence[Subscriber], groups: EventGroups) -> None:
+        self._recorder, self._subscribers, self._groups = recorder, subscribers, groups
+
+    def publish(self, document: Document) -> None:
+        """Record it, then pass it to every subscriber; an event in its group, or later."""
+        if isinstance(document, Event):
+            self._report(self._groups.take(document))
+            return
+        self._recorder.take(document)
+        self.announce(document)
+
+    def publish_all(self, documents: Iterable[Document]) -> None:
+        """Publish several, in this order."""
+        for document in documents:
+            self.publish(document)
+
+    def announce(self, document: Document) -> None:
+        """Pass it to every subscriber without recording it: it is in the record already, or is not for it."""
+        for subscriber in self._subscribers:
+            subscriber(document)
+
+    def report_groups(self, time_s: float) -> None:
+        """Publish the events that waited long enough at machine time `time_s`."""
+        self._report(self._groups.due(time_s))
+
+    def report_groups_while_silent(self, now_s: float) -> None:
+        """The same at `now_s` of this computer, while the machine time does not advance."""
+        self._report(self._groups.due_while_silent(now_s))
+
+    def finish_groups(self) -> None:
+        """Publish all waiting events, at the end of the run."""
+        self._report(self._groups.finish())
+
+    def _report(self, events: list[Event]) -> None:
+        for event in events:
+            self._recorder.take(event)
+            if event.kind not in _LOGGED_ELSEWHERE:
+                level = logging.WARNING if event.kind in _URGENT else logging.INFO
+                _logger.log(level, "%s: %s", self._recorder.path, event.message)
+            self.announce(event)
+
 
 _SILENT_S = 0.2  # without a Block
 

@@ -16,7 +16,7 @@ from livebode.language import Message
 from livebode.runtime.allocation import FreeMemory, share_between_threads
 from livebode.runtime.axis_thread import AxisThread
 from livebode.runtime.change import ChangeRequest, change_of
-from livebode.runtime.destination import Destination, nothing
+from livebode.runtime.recorder import Destination, nothing
 from livebode.runtime.service_manager import ServiceManager
 from livebode.runtime.status import Status
 

@@ -1,4 +1,4 @@
-"""SingleResponse: the response from one input to one output, with fits, margins and alarms."""
+"""SingleResponse: the response from one input to one output, with fits, margins, alarms and findings on recordings."""
 
 from __future__ import annotations
 
@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from livebode import preparation
 from livebode.analysis import LIVE_VALUES_MAX, Overview
 from livebode.configuration import Axis
-from livebode.core import Block, Channel, Event, LivebodeError, Responses, Stateful
+from livebode.core import Block, Channel, Event, Lines, LivebodeError, Responses, Stateful
 from livebode.estimation import Follower, Settings, plant_kinds, response_unit
+from livebode.language import Message
 from livebode.preparation import check_excitation, check_some_valid
 from livebode.records import RESPONSE_TABLES
 from livebode.runtime import summary
@@ -28,15 +29,92 @@ from livebode.runtime.estimate import (
     RunContext,
     check_channels,
 )
-from livebode.runtime.recording_findings import between_events, drift_events, of_drift, of_recordings
 
 if TYPE_CHECKING:
     from livebode.core import Parameters
-    from livebode.fitting import DriftTest, Fit, RecordingsMean
+    from livebode.fitting import Drift, DriftTest, Fit, RecordingsMean
     from livebode.runtime.fits import Fits
     from livebode.runtime.live_checks import LiveChecks
     from livebode.runtime.readiness import Readiness
     from livebode.sources.live import LiveSource
+
+
+def of_drift(drift: Drift, lines: Lines) -> dict[str, Any]:
+    """Entries on a drift of the machine within the recording: at the lines where it is significant, or the clearest."""
+    if not drift.significant:
+        return {"found": False, "lines": []}
+    shown = drift.lines.copy()
+    if not shown.any():
+        shown[np.nanargmax(np.abs(drift.change) / drift.sigma)] = True
+    size = np.abs(drift.value)
+    rows = [
+        {
+            "frequency_hz": float(lines.frequency_hz[i]),
+            "percent": 100 * float(abs(drift.change[i]) / size[i]),
+            "percent_sigma": 100 * float(drift.sigma[i] / size[i]),
+        }
+        for i in np.flatnonzero(shown)
+    ]
+    return {"found": True, "lines": rows}
+
+
+def drift_events(drift: Mapping[str, Any], sample: int, time_s: float) -> list[Event]:
+    """None, or one event, at the end of the recording; `drift` as in run.json."""
+    if not drift["found"]:
+        return []
+    most = max(drift["lines"], key=lambda line: line["percent"])
+    message = Message(
+        "the response drifts during the recording, most at {line_hz:g} Hz: by {percent:.2g} % ± "
+        "{bound_percent:.1g} % from the beginning to the end; the bound of a mean contains the drift",
+        line_hz=most["frequency_hz"],
+        percent=most["percent"],
+        bound_percent=1.96 * most["percent_sigma"],
+    )
+    return [Event("drift", sample, time_s, message, {"lines": drift["lines"]})]
+
+
+def of_recordings(mean: RecordingsMean) -> dict[str, Any]:
+    """Entries on the scatter between several recordings; at lines where something is not known it is null."""
+    found = mean.result()[1]
+    of_line = {"noise_sigma": found.noise, "total_sigma": found.total, "distortion": found.distortion}
+    of_all = {"chance": found.chance, "distortion_db": found.distortion_db, "noise_db": found.noise_db}
+    return {
+        "recordings": found.recordings,
+        "realisations": mean.realisations,
+        "differs": found.differs,
+        **{name: value if np.isfinite(value) else None for name, value in of_all.items()},
+        **{name: [v if np.isfinite(v) else None for v in values.tolist()] for name, values in of_line.items()},
+    }
+
+
+def between_events(between: Mapping[str, Any], sample: int, time_s: float) -> list[Event]:
+    """None, or one event, at the end of the run; `between` as in run.json."""
+    count, noise_db = between["recordings"], between["noise_db"]
+    noise = Message("not known") if noise_db is None else Message("{level_db:.1f} dB", level_db=noise_db)
+    details = {name: between[name] for name in ("recordings", "chance", "distortion_db", "noise_db")}
+    found = between["differs"] and between["distortion_db"] is not None
+    if between["realisations"]:
+        level = Message("not significant")
+        if found:
+            level = Message("{level_db:.1f} dB", level_db=between["distortion_db"])
+        message = Message(
+            "best linear approximation of {realisations} realisations: stochastic distortion, relative to the output "
+            "at a line, {level}; noise of the mean {noise}",
+            realisations=count,
+            level=level,
+            noise=noise,
+        )
+        return [Event("best-linear-approximation", sample, time_s, message, details)]
+    if not found:
+        return []
+    message = Message(
+        "the {recordings} recordings differ by more than their noise: by {distortion_db:.1f} dB relative to the "
+        "output at a line; noise of the mean {noise}; the bound of the mean contains the difference",
+        recordings=count,
+        distortion_db=between["distortion_db"],
+        noise=noise,
+    )
+    return [Event("recordings-differ", sample, time_s, message, details)]
 
 
 @dataclass(eq=False)

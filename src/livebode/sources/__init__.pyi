@@ -1,9 +1,4 @@
-from livebode.sources._part_limit import PartLimit as PartLimit
-from livebode.sources._part_limit import part_limit as part_limit
 from livebode.sources.cells import is_number as is_number
-from livebode.sources.damage import damaged as damaged
-from livebode.sources.damage import oversized as oversized
-from livebode.sources.damage import truncated as truncated
 from livebode.sources.delimited import DelimitedRecording as DelimitedRecording
 from livebode.sources.dialect import Dialect as Dialect
 from livebode.sources.dialect import Sample as Sample
@@ -14,6 +9,8 @@ from livebode.sources.formats import Format as Format
 from livebode.sources.formats import no_frames as no_frames
 from livebode.sources.formats import open_file as open_file
 from livebode.sources.formats import read_head as read_head
+from livebode.sources.live.settings import PartLimit as PartLimit
+from livebode.sources.live.settings import part_limit as part_limit
 from livebode.sources.log import Log as Log
 from livebode.sources.opening import UNEVEN as UNEVEN
 from livebode.sources.opening import even_or_uneven_log as even_or_uneven_log
@@ -25,7 +22,10 @@ from livebode.sources.recording import Column as Column
 from livebode.sources.recording import Recording as Recording
 from livebode.sources.recording import Skipped as Skipped
 from livebode.sources.recording import contained as contained
+from livebode.sources.recording import damaged as damaged
 from livebode.sources.recording import located as located
+from livebode.sources.recording import oversized as oversized
+from livebode.sources.recording import truncated as truncated
 from livebode.sources.resample import Resampler as Resampler
 from livebode.sources.steps import Gap as Gap
 from livebode.sources.steps import exact_rate_hz as exact_rate_hz

@@ -8,8 +8,7 @@ from itertools import product
 
 import numpy as np
 
-from livebode.sources.damage import oversized
-from livebode.sources.recording import COLUMNS_MAX, Column, Skipped
+from livebode.sources.recording import COLUMNS_MAX, Column, Skipped, oversized
 from livebode.sources.units import split_unit
 
 WIDTH_MAX = 64

@@ -6,8 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from enum import Enum
 from typing import NamedTuple
 
-from livebode.sources.damage import oversized
-from livebode.sources.recording import COLUMNS_MAX, Column, Skipped
+from livebode.sources.recording import COLUMNS_MAX, Column, Skipped, oversized
 from livebode.sources.units import split_units
 
 UNIT_KEYS = "unit", "units"

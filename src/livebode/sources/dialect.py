@@ -12,9 +12,8 @@ from pathlib import Path
 
 from livebode.core import RecordingError
 from livebode.sources.cells import EMPTY, CellKind, is_comment, is_number, is_value, is_word, kind_of, zoned
-from livebode.sources.damage import oversized
 from livebode.sources.header import find_comment_header, find_header, fits, keyed_header, no_values, stated_period_s
-from livebode.sources.recording import COLUMNS_MAX
+from livebode.sources.recording import COLUMNS_MAX, oversized
 
 SAMPLE_BYTES = 1 << 18
 SAMPLE_LINES = 400

@@ -13,9 +13,8 @@ import numpy as np
 
 from livebode.core import not_installed
 from livebode.sources.arrays import DEPTH_MAX, array_columns, check_nesting
-from livebode.sources.damage import oversized
 from livebode.sources.friendly import with_friendly_names
-from livebode.sources.recording import COLUMNS_MAX, Chunk, Column, Recording, Skipped
+from livebode.sources.recording import COLUMNS_MAX, Chunk, Column, Recording, Skipped, oversized
 from livebode.tables import PACKED_MAX
 
 UNIT_ATTRIBUTES = "unit", "units", "Unit", "Units"

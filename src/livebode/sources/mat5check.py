@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from livebode.core import RecordingError
-from livebode.sources.damage import damaged, oversized, truncated
+from livebode.sources.recording import damaged, oversized, truncated
 
 HEADER_BYTES = 128
 COMPRESSED, MATRIX = 15, 14

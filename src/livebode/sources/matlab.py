@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from livebode.core import needing
 from livebode.sources.arrays import array_columns, check_nesting
-from livebode.sources.damage import damaged, truncated
 from livebode.sources.friendly import with_friendly_names
 from livebode.sources.mat5check import (
     COMPRESSED,
@@ -27,7 +26,7 @@ from livebode.sources.mat5check import (
     Variable,
     list_variables,
 )
-from livebode.sources.recording import Chunk, Column, Recording, Skipped
+from livebode.sources.recording import Chunk, Column, Recording, Skipped, damaged, truncated
 
 _TYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
 LENGTH_MIN = 1024

@@ -15,8 +15,7 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from livebode.sources.arrays import Slot, array_columns
-from livebode.sources.damage import oversized, truncated
-from livebode.sources.recording import COLUMNS_MAX, Chunk, Column, Recording, Skipped
+from livebode.sources.recording import COLUMNS_MAX, Chunk, Column, Recording, Skipped, oversized, truncated
 
 HEADER_BYTES_MAX = 10_000
 

@@ -7,9 +7,8 @@ from pathlib import Path
 from typing import ClassVar
 
 from livebode.sources.columnar import Content, StoredColumn, columns_of, scalars_of
-from livebode.sources.damage import check_packed
 from livebode.sources.extras import missing
-from livebode.sources.recording import Chunk, Column, Recording
+from livebode.sources.recording import Chunk, Column, Recording, check_packed
 from livebode.tables import STRING, WRITER, ParquetFile
 
 _END_BYTES = 1 << 16  # a footer ends with its writer, and three bytes for each column

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from livebode import tables
 from livebode.sources.columnar import Content, StoredColumn, columns_of, scalars_of
-from livebode.sources.damage import check_packed
-from livebode.sources.recording import Chunk, Column, Recording
+from livebode.sources.recording import Chunk, Column, Recording, check_packed
 
 _NANOSECONDS = {"s": 1_000_000_000, "ms": 1_000_000, "us": 1_000, "ns": 1}
 BATCH_ROWS_MIN = 1 << 16

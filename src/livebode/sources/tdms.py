@@ -13,8 +13,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from livebode.core import not_installed
-from livebode.sources.damage import damaged, oversized, truncated
-from livebode.sources.recording import COLUMNS_MAX, Chunk, Column, Recording, Skipped
+from livebode.sources.recording import COLUMNS_MAX, Chunk, Column, Recording, Skipped, damaged, oversized, truncated
 from livebode.sources.steps import exact_rate_hz
 
 UNITS = "unit_string", "NI_UnitDescription", "unit"

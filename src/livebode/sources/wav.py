@@ -10,8 +10,7 @@ from pathlib import Path
 from typing import IO, ClassVar
 
 from livebode.core import needing
-from livebode.sources.damage import damaged, oversized, truncated
-from livebode.sources.recording import COLUMNS_MAX, Chunk, Column, Recording
+from livebode.sources.recording import COLUMNS_MAX, Chunk, Column, Recording, damaged, oversized, truncated
 
 with needing("SciPy", "analysis", "a WAV file"):
     from scipy.io import wavfile

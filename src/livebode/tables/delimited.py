@@ -1,4 +1,4 @@
-"""Rows of text as columns of numbers and back, in C; `livebode.sources.rows` and `repr` define the values."""
+"""Rows of text as columns of numbers and back, in C; `livebode.sources.delimited` and `repr` define the values."""
 
 from __future__ import annotations
 

@@ -32,11 +32,14 @@ def test_a_chosen_window_resolves_what_was_asked_is_hardly_longer_and_a_hop_divi
 
 @settings(max_examples=40, deadline=None)
 @given(
-    resolution_hz=st.floats(1e-3, 0.39),
+    resolution_hz=st.floats(0.1, 0.39),
     low=st.floats(1, 100),
     width=st.floats(10, 1800),
     kind=st.sampled_from(["multisine", "odd", "chirp", "prbs"]),
 )
+@example(0.001, 1.0, 1800.0, "multisine")  # a longer window than there is
+@example(0.01, 1.0, 1800.0, "odd")  # hundreds of thousands of lines
+@example(0.01, 1.0, 1800.0, "prbs")
 @example(0.1, 10.1818, 1454.7, "chirp")  # at 0.291 Hz the window that a hop divides is longer: 5001 lines
 def test_more_lines_than_useful_are_refused_and_the_named_resolution_passes(resolution_hz, low, width, kind):
     def lines(apart_hz):
@@ -85,7 +88,7 @@ def test_listed_amplitudes_are_reported_as_listed_and_refused_with_the_share_tha
 )  # fmt: skip
 def test_the_amplitude_that_a_refusal_names_passes_in_the_drive_s_steps_too(step, limit, kind):
     spec = {"band_hz": (20, 140), "resolution_hz": 10, "kind": kind, "resolution_n_m": step}
-    spec |= {"phases": "schroeder"} if kind == "multisine" else {}
+    spec |= {"phases": "schroeder"} if kind in ("multisine", "odd") else {}
     with pytest.raises(DesignError) as caught:
         choose(ExperimentSpec(**spec, amplitude_n_m=20.0), MACHINE, MachineLimits(torque_n_m_max=limit))
     assert caught.value.code == "design.limit-exceeded"
@@ -114,7 +117,8 @@ def test_a_recording_longer_than_an_hour_reports_the_accuracy_of_one_hour():
 
 def test_the_frequency_above_which_the_loop_is_20_db_below_one_is_named_for_tuning():
     def row(lines):
-        design = choose(ExperimentSpec(lines=lines, window=4000, amplitude_n_m=0.1), MACHINE)
+        spec = ExperimentSpec(lines=lines, window=4000, phases="schroeder", amplitude_n_m=0.1)
+        design = choose(spec, MACHINE)
         return next(choice for choice in design.choices if choice.what == "for tuning")
 
     wide = row("20:1500:20")

@@ -81,7 +81,7 @@ def test_a_run_draws_its_pictures_and_is_replaced_with_them(folder: Path) -> Non
 
 
 def test_without_matplotlib_a_run_says_how_to_get_pictures(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("livebode.cli.picture_support.can_draw", lambda: False)
+    monkeypatch.setattr("livebode.cli.pictures.can_draw", lambda: False)
     monkeypatch.setattr("livebode_matrix.terminal.can_draw", lambda: False)
     found = livebode("run", folder / "before.toml", "--out", folder / "bare", pictures=True)
     assert found.code == 0

@@ -207,7 +207,13 @@ def test_the_first_page_has_machine_verdict_one_picture_and_signatures(run: Path
     assert len(re.findall(r"<svg", (run / "report.html").read_text("utf-8").split("</header>")[0])) == 1
 
 
-def test_the_limits_are_judged_by_the_numbers_of_fit_margins_and_lines(run: Path) -> None:
+def test_the_limits_are_judged_by_the_numbers_of_fit_margins_and_lines(
+    run: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # Only what the command prints is examined: page and paper of the same run are drawn once, for the other tests.
+    monkeypatch.setattr("livebode_reports.svg.pictures_svg", lambda _: ())
+    monkeypatch.setattr("livebode_reports.html.to_html", lambda *_: "")
+    monkeypatch.setattr("livebode_reports.pdf.save_pdf", lambda _, path, __: path.write_bytes(b""))
     done = livebode("report", run, "--json", "--check", "--out", run.parent / "again")
     assert done.code == 4
     found = json.loads(done.out)

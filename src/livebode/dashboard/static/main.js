@@ -20,7 +20,6 @@ import { Lost } from "./lost.js";
 import { byId as $, choose, element, segments } from "./make.js";
 import { LineMap } from "./map.js";
 import { isMargin, Margins, marginWords } from "./margins.js";
-import { Matrix } from "./matrix.js";
 import { past } from "./past.js";
 import { readout } from "./readout.js";
 import { References } from "./references.js";
@@ -118,12 +117,12 @@ const timeline = new Timeline(
     onMoment: (timeS) => {
       rememberMoment(timeS);
       showMoment(timeS);
-      matrix.fetch();
+      for (const part of Object.values(additions)) part.moment?.();
     },
     onLive: () => {
       rememberMoment(null);
       goLive();
-      matrix.fetch();
+      for (const part of Object.values(additions)) part.moment?.();
     },
   },
 );
@@ -304,7 +303,6 @@ function begin({ facts, axes, trends }) {
   over.disable("position", facts.schedule ? "" : NO_POSITION);
   mapOver.disable("position", facts.schedule ? "" : NO_POSITION);
   drawLegend();
-  matrix.begin(facts);
   for (const part of Object.values(additions)) part.begin();
   parameters.begin(trends);
   margins.begin(trends, whyNoMargins(facts));
@@ -450,15 +448,16 @@ const { over, mapOver } = controls(page, parts, { watch, fill, watchShown, clear
 const showAlarm = alarmMoment(page, timeline, { references, complain });
 tools($("bode-tools"), bode);
 viewMenu($("bode-view"), $("bode-view-panel"), bode, () => delayMs(parameters.items.values(), timeline.atS ?? NaN));
-const matrix = new Matrix(page, timeline, {
-  choose: (axis) => {
-    axisChoice.value = String(axis);
-    axisChoice.dispatchEvent(new Event("change"));
-  },
-  complain,
-});
+/** @param {number} axis */
+const chooseAxis = (axis) => {
+  axisChoice.value = String(axis);
+  axisChoice.dispatchEvent(new Event("change"));
+};
 const additions = Object.fromEntries(
-  Object.entries(ADDITIONS).map(([name, added]) => [name, added(page, bode, { watch, complain })]),
+  Object.entries(ADDITIONS).map(([name, added]) => [
+    name,
+    added(page, bode, { timeline, watch, choose: chooseAxis, complain }),
+  ]),
 );
 const operator = () => page.facts?.role === "operator";
 const curves = curvesMenu($("bode-curves"), $("bode-curves-panel"), { bode, references, saved, operator, complain });
@@ -466,5 +465,5 @@ const showClock = zoneChoice($("clock", HTMLSelectElement));
 const lost = new Lost($("lost"));
 describe(page, { bode, tracking, map, trends: [parameters, marginTrends] });
 onClock(newClock);
-window.livebode = { page, ...parts, parameters, margins, marginTrends, saved, zoom, matrix, ...additions };
+window.livebode = { page, ...parts, parameters, margins, marginTrends, saved, zoom, ...additions };
 requestAnimationFrame(draw);

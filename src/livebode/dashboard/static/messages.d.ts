@@ -3,6 +3,7 @@ import type { Bode } from "./bode.js";
 import type { Curve } from "./curves.js";
 import type { Mark } from "./marks.js";
 import type { Rows } from "./rows.js";
+import type { Timeline } from "./timeline.js";
 
 export type Quantity = "plant" | "open loop" | "closed loop" | "sensitivity";
 /** A stored response; the first one has no number. */
@@ -81,20 +82,6 @@ export interface MatrixNames {
   outputs: string[];
   inputs: string[];
   first_axis: number;
-}
-
-/** One matrix; see matrix_group.py. */
-export interface MatrixAnswer extends MatrixNames {
-  frequency_hz: number[];
-  time_s: number;
-  dof: Sent;
-  /** by output and input; `reach` is 3σ/|G| */
-  entries: { db: Sent[]; reach: Sent[]; unit: string }[][];
-  /** of each input: lines at which its column is invalid, by reason */
-  reasons: Partial<Record<"incomplete" | "not excited" | "not separated", number>>[];
-  singular_db: Sent[][];
-  condition: Sent[];
-  coherence: Sent[][];
 }
 
 export type Facts = Waiting | Run;
@@ -314,13 +301,21 @@ export interface AddedPart {
   begin(): void;
   /** Once a frame, while `page.dirty` has "additions". */
   draw(): void;
+  /** Another time is shown. */
+  moment?(): void;
 }
 
 /** Called once, when the page is complete. */
 export type Addition = (
   page: Page,
   bode: Bode,
-  actions: { watch: (quantity: Quantity) => void; complain: (text: string) => void },
+  actions: {
+    timeline: Timeline;
+    watch: (quantity: Quantity) => void;
+    /** Show another axis. */
+    choose: (axis: number) => void;
+    complain: (text: string) => void;
+  },
 ) => AddedPart;
 
 /** What the page shows, and what is to be drawn again (`dirty`). */

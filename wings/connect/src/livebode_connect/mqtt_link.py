@@ -11,7 +11,7 @@ from livebode.core import PublishError, not_installed
 from livebode.publishing import PublishSection, address, client_tls, password, unreachable
 
 _KEEPALIVE_S = 30
-_LAST_S = 1.0
+_LAST_S = 1.0  # for the last message: an ending run does not wait longer for a broker
 Message = tuple[str, bytes, bool]
 """Topic, payload, and whether the broker keeps it for new subscribers."""
 

@@ -100,7 +100,7 @@ _SEVERITIES = {"high": 900, "medium": 600, "low": 300, "info": 100}
 _UNIT_CODES = {"Hz": "HTZ", "s": "SEC", "kg": "KGM", "kg m²": "B32", "deg": "DD", "dB": "2N", "N/m": "4P"}
 """Codes of UNECE Recommendation 20, from which OPC UA makes the number of a unit."""
 _UNITS_OF = "http://www.opcfoundation.org/UA/units/un/cefact"
-_START_S = 60.0
+_START_S = 60.0  # for the start of the server, and for each change of its nodes
 
 
 class OpcUaSink:

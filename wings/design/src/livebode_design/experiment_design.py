@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from importlib.util import find_spec
 from os import PathLike
 from pathlib import Path
@@ -137,7 +138,7 @@ def design_experiment(
         for kind in kinds or (kind for kind in experiment.formats if kind not in left_out):
             experiment.write(partial / f"{name}{kind}", design, name)
         (partial / _AXIS).write_text(f"#:schema ./{_SCHEMA}\n{experiment.axis_text(design)}", encoding="utf-8")
-        (partial / _SCHEMA).write_text(to_json(axis_schema(), indent=2) + "\n", encoding="utf-8")
+        (partial / _SCHEMA).write_text(_schema_text(), encoding="utf-8")
         if draw is not None:
             draw(design, partial / f"{name}.png")
         files = tuple(sorted([*(path.name for path in partial.iterdir()), _MARK]))
@@ -145,6 +146,11 @@ def design_experiment(
         (partial / _MARK).write_text(to_json(facts, indent=1) + "\n", encoding="utf-8")
         _check_free(directory, force)
     return DesignFiles(design, directory, files, "\n".join(left_out.values()))
+
+
+@cache
+def _schema_text() -> str:
+    return to_json(axis_schema(), indent=2) + "\n"
 
 
 def _without_scipy() -> dict[str, str]:

@@ -1,4 +1,4 @@
-"""The kind of estimate of this wing, with its rules."""
+"""The kind of estimate of this wing, with its rules, and what the wing adds to the page of a run."""
 
 from collections.abc import Mapping
 
@@ -17,3 +17,5 @@ ESTIMATES: Mapping[str, Mapping[str, str]] = {
         "export": "livebode.cli.export_command:matrices",
     }
 }
+PAGES: Mapping[str, str] = {"matrix": "livebode_matrix.page:MatrixPage"}
+"""What it adds to the page of a run."""

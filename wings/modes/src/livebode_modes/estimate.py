@@ -29,8 +29,8 @@ OK = "ok"
 NOT_FOUND, HARMONIC = "not found", "harmonic"
 _NEAR = 0.02  # of the frequency, from window to window
 _SIGMAS = 3.0
-_GAP_FACTOR_MAX = 3
-_MAC_MIN = 0.6
+_GAP_FACTOR_MAX = 3  # a mode that was missed may have moved further
+_MAC_MIN = 0.6  # of the shapes of one mode in two windows
 _NAMES: dict[Kind, tuple[str, ...]] = {"mode": ("frequency", "damping", "share"), "harmonic": ("frequency", "share")}
 _UNITS = {"frequency": "Hz", "damping": "", "share": ""}
 

@@ -20,8 +20,8 @@ with needing("SciPy", "analysis", "a run from the outputs alone"):
     import scipy  # its parts are loaded when they are first used
 
 
-_POWER = 0.99
-_MARGIN = 1.25
+_POWER = 0.99  # share of the power above the median that the band contains
+_MARGIN = 1.25  # the band ends above the frequency that this power reaches
 _SEGMENT = 1 << 12
 
 

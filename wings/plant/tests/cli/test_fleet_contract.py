@@ -12,6 +12,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from livebode.sources.live import encode_line
+from livebode_plant.fleet import connection
 from livebode_plant.fleet.fleet_settings import FleetSettings
 from livebode_plant.fleet.server import LogServer
 from tests.support.command import livebode
@@ -132,7 +133,8 @@ def test_a_fleet_or_what_needs_none_is_given(words: list[str], says: str) -> Non
     assert (refused.code, says in refused.err) == (2, True), refused.err
 
 
-def test_without_a_server_a_command_says_so_in_one_sentence(tmp_path: Path) -> None:
+def test_without_a_server_a_command_says_so_in_one_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(connection, "_START_S", 0.3)
     (tmp_path / "axis.toml").write_text(AXIS)
     (tmp_path / "fleet.toml").write_text('axes = ["axis.toml"]\n[log]\nurl = "nats://127.0.0.1:1"')
     refused = livebode("fleet", "status", tmp_path / "fleet.toml")

@@ -11,6 +11,7 @@ import pytest
 
 from livebode.configuration import Axis
 from livebode.core import FleetError
+from livebode_plant.fleet import connection
 from livebode_plant.fleet.fleet_settings import LogSection
 from livebode_plant.fleet.log import FleetLog
 from livebode_plant.fleet.message import write_message
@@ -169,7 +170,8 @@ def test_an_axis_whose_channels_are_missing_is_not_tracked_and_the_others_are(se
     assert checked(settings, wrong).exact
 
 
-def test_a_server_that_is_not_there_is_one_sentence() -> None:
+def test_a_server_that_is_not_there_is_one_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(connection, "_START_S", 0.3)
     with pytest.raises(FleetError, match="cannot be reached"):
         checked(LogSection(url="nats://127.0.0.1:1"), {})
 

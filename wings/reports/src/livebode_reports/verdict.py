@@ -15,8 +15,8 @@ from livebode_reports.report_data import ReportData, RunData
 from livebode_reports.wording import lines_of, share
 
 _URGENT: dict[Tone, int] = {"alarm": 0, "differs": 0, "check": 1, "open": 2, "ok": 3}
-_INVALID_MANY = 0.05
-_EPSILON_LARGE = 0.1
+_INVALID_MANY = 0.05  # share of the rows
+_EPSILON_LARGE = 0.1  # share of the response that the model does not explain
 # Usual limits in motion control; a loop beyond them rings.
 _PHASE_MIN_DEG, _MS_MAX = 30.0, 2.0
 

@@ -10,7 +10,7 @@ from livebode.configuration import LoopSection, PIDSection
 
 _RULES = ("backward", "forward", "trapezoidal", "continuous")
 _WHERE = ("plant input", "velocity reference", "output")
-_DELAY_TICKS_MAX = 3
+_DELAY_TICKS_MAX = 3  # by which a described delay may be wrong
 _DIVIDERS = range(1, 17)  # of a position controller
 
 

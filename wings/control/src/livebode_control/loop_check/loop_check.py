@@ -21,7 +21,7 @@ ALPHA = 0.002
 HARMLESS = 5e-4
 """Share of the signals, and relative change of a number, that is below the accuracy of any description."""
 _ALIKE = 10.0  # of twice the log-likelihood: odds of 150 to 1
-_STEPS_MAX = 25
+_STEPS_MAX = 25  # of the search for a value
 _Z95 = 1.96
 
 

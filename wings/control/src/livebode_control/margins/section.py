@@ -51,7 +51,7 @@ def _about_margins(loop: LoopReport) -> str:
 def _about_description(loop: LoopReport) -> str:
     """Whether the margins are of a loop whose description was checked."""
     if loop.checked.verdict == "not checked":
-        return tr("The description of the controllers was not compared with the signals (livebode validate --loop).")
+        return tr("The description of the controllers was not compared with the signals.")
     if loop.checked.verdict == "as described":
         return tr("The description of the controllers was compared with the signals: the loop is as described.")
     return tr(

@@ -12,7 +12,7 @@ from livebode.arrays import Complex, Floats
 from livebode.core import widened
 from livebode.motion import AngleWindows, Shaft
 
-_STROKES_MIN = 5
+_STROKES_MIN = 5  # fewer give no usable scatter
 _FALSE = 1e-3  # probability that any order of a shaft has an error by chance
 _SPREAD = 1.2  # fastest over slowest stroke, from which a torque and an error differ
 _LEVERAGE = 0.99  # of a stroke on the slope, above which its residual is nothing but rounding

@@ -11,7 +11,7 @@ from livebode.arrays import Floats
 from livebode.core import Responses, SignalError, t_quantile
 from livebode.motion import FrictionCurve
 
-_OF_ANTIRESONANCE = 0.5
+_OF_ANTIRESONANCE = 0.5  # the lines below this share of its frequency show the inertia
 _LINES_MIN = 4
 _OF_IMAGINARY = np.sqrt(0.5)  # sigma is of a circular error, half of whose power is in the imaginary part
 _SHARE = (1e-9, 10.0)  # of the size, by which the model may be wrong

@@ -16,8 +16,8 @@ from livebode_control.tuning.filters import Biquad, low_pass, notch_over
 Verdict = Literal["none needed", "suggested", "refused"]
 
 _DEPTHS_DB = (6.0, 10.0, 14.0, 20.0, 26.0, 32.0)
-_LOW_PASSES = 24
-_ROWS = 32
+_LOW_PASSES = 24  # corners that are tried
+_ROWS = 32  # of the fits, spread over the schedule: each filter is judged at all of them
 _WIDEST = 2.0  # highest over lowest frequency of a resonance that a notch can follow
 _SURE = 0.25  # of Ms: with a wider bound a comparison is meaningless
 _PLACES = 1.96

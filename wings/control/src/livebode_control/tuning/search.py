@@ -19,8 +19,8 @@ from livebode_control.tuning.structure import FeedbackStructure, TunedFeedback
 _WEIGHTS = {"gain": 1.0, "integral_time": -0.15, "position_gain": 0.15, "derivative_time": 0.02, "low_pass": 0.01}
 _PER_NOTCH = {"depth": 0.01, "damping": -0.005}
 _ROUNDS, _STEPS, _MOVE = 5, 12, 0.7
-_ACTIVE = 60
-_STARTS = 20
+_ACTIVE = 60  # points with the least clearance, which alone limit a step
+_STARTS = 20  # crossovers of the textbook settings
 _CORNERS = np.array([0.4, 0.8, 1.6])  # of a low-pass, over the highest line: where the search begins
 _BACK = 25  # halvings of the way back to a controller that keeps every limit
 _SIMPLER = 0.05  # of the gain, that a filter must bring

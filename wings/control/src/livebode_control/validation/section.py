@@ -21,7 +21,7 @@ class ValidationReport:
     """Verdicts and remarks of a validation on the recording of this name."""
 
     on: str
-    found: tuple[Validation, ...]
+    validations: tuple[Validation, ...]
     notes: tuple[str, ...]
 
     def findings(self) -> list[Finding]:
@@ -30,18 +30,18 @@ class ValidationReport:
             Finding(
                 _TONES[v.verdict], tr("On {recording}: {sentence}.", recording=self.on, sentence=worded(v.sentence))
             )
-            for v in self.found
+            for v in self.validations
         ]
 
     def section(self) -> Section:
         """Verdicts, correlations and their picture."""
-        parts: list[Part] = [Paragraph(f"{worded(v.sentence)}.") for v in self.found]
+        parts: list[Part] = [Paragraph(f"{worded(v.sentence)}.") for v in self.validations]
         rows = tuple(
             (
                 worded(v.model), c.name, f"{number(100 * c.share, '.0f')} %", number(c.largest, ".3g"),
                 number(c.p, ".2g"), tr("yes") if c.name in v.judged_by else tr("no"),
             )
-            for v in self.found
+            for v in self.validations
             for c in v.correlations
         )  # fmt: skip
         headings = (tr("model"), tr("ε with"), tr("lags inside"), tr("largest"), tr("joint p"), tr("counts"))
@@ -50,7 +50,8 @@ class ValidationReport:
             "On {recording}: measured and simulated output, and the residual's correlations with their limits.",
             recording=self.on,
         )
-        parts.append(Picture(_FIGURE, {"validations": self.found, "title": tr("Measured and simulated")}, caption))
+        drawn = {"validations": self.validations, "title": tr("Measured and simulated")}
+        parts.append(Picture(_FIGURE, drawn, caption))
         return Section(tr("Validation"), tuple(parts))
 
 

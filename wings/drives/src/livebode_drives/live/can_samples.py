@@ -19,7 +19,7 @@ TOLERANCE = 0.4
 """A frame that is further from its due time than this, in periods, has no certain number."""
 PAUSE_PERIODS = 200
 """Longest pause after which numbers are certain: 0.2 % between two clocks are 0.4 periods then."""
-_GAIN = 0.05
+_GAIN = 0.05  # of the loop that follows the clock of the sender: the jitter of the bus is averaged
 
 
 class FrameClock:

@@ -31,7 +31,7 @@ class TracedVariable:
     """The samples of a variable: byte and line at which they begin, their number, and a fingerprint of their times."""
 
     name: str
-    at: int
+    position: int
     line: int
     samples: int
     times: bytes
@@ -63,7 +63,7 @@ class CodesysRecording(Recording):
 
     def chunks(self, columns: Sequence[Column], rows: int) -> Iterator[Chunk]:
         sections = list(dict.fromkeys(column.key[0] for column in columns))
-        place = {section: section.at for section in sections}
+        place = {section: section.position for section in sections}
         samples = columns[0].samples or 0
         with self.path.open("rb") as file:
             for first in range(0, samples, rows):

@@ -10,7 +10,8 @@ import { ask, reason } from "./link.js";
 import { byId as $, element } from "./make.js";
 import { hertz, plain, signed } from "./words.js";
 
-/** @import { MatrixAnswer, Page, Run, Sent } from "./messages.js" */
+/** @import { MatrixAnswer } from "./answer.js" */
+/** @import { Addition, Page, Sent } from "./messages.js" */
 /** @import { Timeline } from "./timeline.js" */
 
 const AGAIN_MS = 2000,
@@ -26,17 +27,45 @@ const REASONS = {
   "not separated": tr("not separated from the other inputs"),
 };
 
-export class Matrix {
-  /**
-   * @param {Page} page
-   * @param {Timeline} timeline
-   * @param {{choose: (axis: number) => void, complain: (text: string) => void}} actions
-   */
-  constructor(page, timeline, { choose, complain }) {
+/** Add the elements to the page. */
+function attach() {
+  const open = element(
+    "button",
+    {
+      id: "matrix-open",
+      type: "button",
+      "aria-pressed": "false",
+      title: tr("All entries, singular values and coherence"),
+      hidden: true,
+    },
+    tr("Matrix"),
+  );
+  $("quantities").after(open);
+  const heading = element(
+    "header",
+    {},
+    element("h2", { id: "matrix-title" }, tr("Matrix of responses")),
+    element("p", { class: "note", id: "matrix-about" }),
+  );
+  document
+    .querySelector("main")
+    ?.before(
+      element(
+        "main",
+        { id: "matrix", class: "matrix", "aria-labelledby": "matrix-title", hidden: true },
+        element("div", { class: "card" }, heading, element("div", { class: "matrix-cells", id: "matrix-cells" })),
+        element("div", { class: "matrix-figures", id: "matrix-figures" }),
+      ),
+    );
+}
+
+class Matrix {
+  /** @param {Page} page @param {Timeline} timeline @param {(axis: number) => void} choose */
+  constructor(page, timeline, choose) {
     this.page = page;
     this.timeline = timeline;
     this.choose = choose;
-    this.complain = complain;
+    attach();
     this.section = $("matrix");
     this.button = $("matrix-open");
     this.shown = chosen("matrix", String()) !== "0";
@@ -54,8 +83,8 @@ export class Matrix {
     return facts?.begun ? facts.matrix : null;
   }
 
-  /** @param {Run} facts */
-  begin({ matrix }) {
+  begin() {
+    const matrix = this.run;
     this.button.hidden = !matrix;
     if (this.answer && matrix?.first_axis !== this.answer.first_axis) this.answer = null;
     this.lay();
@@ -75,7 +104,7 @@ export class Matrix {
     document.body.classList.toggle("matrices", on);
     this.button.setAttribute("aria-pressed", String(on));
     if (!on) return;
-    if (this.answer) this.draw();
+    if (this.answer) this.render();
     this.fetch();
   }
 
@@ -92,7 +121,7 @@ export class Matrix {
     try {
       const answer = await ask("/api/matrix", atS === null ? { axis } : { axis, at: atS });
       this.answer = JSON.parse(new TextDecoder().decode(answer));
-      this.draw();
+      this.render();
     } catch (error) {
       $("matrix-about").textContent = reason(error);
     }
@@ -137,7 +166,14 @@ export class Matrix {
       cell.setAttribute("tabindex", cell instanceof HTMLElement && Number(cell.dataset.axis) === axis ? "0" : "-1");
   }
 
-  draw() {
+  /** A new answer is shown when it arrives. */
+  draw() {}
+
+  moment() {
+    this.fetch();
+  }
+
+  render() {
     const { answer, page } = this;
     if (!answer) return;
     const focused = this.section.contains(document.activeElement)
@@ -329,3 +365,6 @@ function legendOf(name, k) {
   made.append(path);
   return element("span", { class: "key" }, made, name);
 }
+
+/** @type {Addition} */
+export const addition = (page, _bode, { timeline, choose }) => new Matrix(page, timeline, choose);
