@@ -1,7 +1,7 @@
 """The command line.
 
-Exit codes: 0 success, 1 internal error, 2 wrong as it is, 3 no model fits, 4 a limit is not met (report --check), 75 what
-may pass, 130 and above stopped by a signal.
+Exit codes: 0 success, 1 internal error, 2 wrong as it is, 3 no model fits, 4 a limit is not met (report --check), 75
+what may pass, 130 and above stopped by a signal.
 """
 
 from __future__ import annotations
