@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Awaitable, Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
-from livebode.plugins import loaded, named
+from livebode.plugins import PluginWarning, loaded, named
 
 if TYPE_CHECKING:
     from starlette.requests import Request
@@ -95,8 +96,16 @@ class PageAddition(Protocol):
 
 
 def page_additions() -> dict[str, type[PageAddition]]:
-    """The additions of all plug-ins by name."""
-    return {name: loaded(reference) for name, reference in named("pages").items()}
+    """The additions of all plug-ins by name; one that cannot be loaded is left out with a PluginWarning."""
+    additions: dict[str, type[PageAddition]] = {}
+    for name, reference in named("pages").items():
+        try:
+            additions[name] = loaded(reference)
+        except Exception as error:  # whatever the module of somebody else does: the page is needed without it, too
+            reason = f"{type(error).__name__}: {' '.join(str(error).split())}"
+            remedy = "update its plug-in, or remove it"
+            warnings.warn(f"{name!r} is not on the page: {reference} ({reason}); {remedy}", PluginWarning, stacklevel=2)
+    return additions
 
 
 def files_of_additions() -> dict[str, bytes]:
