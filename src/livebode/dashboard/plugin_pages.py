@@ -109,10 +109,10 @@ def page_additions() -> dict[str, type[PageAddition]]:
 
 
 def files_of_additions() -> dict[str, bytes]:
-    """Their static files, with the script that names them to the page, and their styles as one file."""
+    """Static files of the additions, with the script that names them to the page, and their styles as one file."""
     additions = page_additions()
-    files = {path.name: path.read_bytes() for one in additions.values() for path in sorted(one.static.iterdir())}
-    imports = [f'import {{ addition as {name} }} from "./{one.script}";' for name, one in additions.items()]
+    files = {path.name: path.read_bytes() for page in additions.values() for path in sorted(page.static.iterdir())}
+    imports = [f'import {{ addition as {name} }} from "./{page.script}";' for name, page in additions.items()]
     script = "\n".join([*imports, f"export const ADDITIONS = {{ {', '.join(additions)} }};", ""])
     styles = b"".join(content for name, content in files.items() if name.endswith(".css"))
     return files | {"additions.js": script.encode(), "additions.css": styles}
