@@ -13,6 +13,7 @@ from tests.support.answers import answers as in_one_process
 from tests.support.loop_runs import AXIS, record
 
 CHIRP = "--excitation w --input u --output velocity --lines 20:140:10 --window 400"
+OUTPUT_ONLY = ("--output-only", "--output", "y", "--rate", "4000")
 ABSENT = ("scipy", "matplotlib", "mpl_toolkits", "PIL", "contourpy", "kiwisolver", "fontTools", "pyarrow", "nanoarrow")
 
 
@@ -53,7 +54,7 @@ def answers(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Answer]:
         "lake": ["archive", "list", str(folder)],
         "archive": ["archive", "run", "example/archive.toml"],
         "fleet": ["fleet", "run", "--demo"],
-        "output-only": ["run", str(folder / "log.parquet"), "--output-only", "--output", "y", "--out", run + "2"],
+        "output-only": ["run", str(folder / "log.parquet"), *OUTPUT_ONLY, "--out", run + "2"],
     }
     return dict(zip(commands, in_one_process(*commands.values(), absent=ABSENT, folder=folder)))
 
