@@ -78,7 +78,8 @@ def test_every_model_finds_itself_from_no_start(case: str) -> None:
     s = found.to_control()
     z = found.to_control(discrete=True)
     f = FINE.frequency_hz[4]
-    assert complex(z(np.exp(2j * np.pi * f / 4000))) == pytest.approx(complex(found.response(f)), rel=1e-6)
+    # A friction that is fitted as nearly zero is a pole near z = 1, where coefficients lose digits (`to_discrete`).
+    assert complex(z(np.exp(2j * np.pi * f / 4000))) == pytest.approx(complex(found.response(f)), rel=5e-6)
     assert complex(s(2j * np.pi * f)) == pytest.approx(
         complex(model.continuous(found.parameters.value[0]).response(np.array([2j * np.pi * f]))[0]), rel=1e-9
     )

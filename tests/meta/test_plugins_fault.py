@@ -15,6 +15,7 @@ import pytest
 from playwright.sync_api import Browser
 
 from livebode import plugins
+from livebode.dashboard import plugin_pages
 from livebode_drives.formats import FORMATS
 from tests.support import recordings
 from tests.support.answers import Answer, answers
@@ -89,6 +90,14 @@ def test_the_tables_are_those_that_importlib_finds(packages: tuple[Path, str], m
         if entry.dist is not None
     }
     assert len(declared) > len(plugins.GROUPS)
+
+
+def test_a_page_without_an_addition_that_cannot_be_loaded_has_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    additions = dict(plugins.named("pages"))
+    monkeypatch.setattr(plugin_pages, "named", lambda _: {"other": "livebode_absent.page:Addition"} | additions)
+    with pytest.warns(plugins.PluginWarning, match="'other' is not on the page: livebode_absent.page:Addition"):
+        files = plugin_pages.files_of_additions()
+    assert [name in files["additions.js"].decode() for name in ("whatIf", "other")] == [True, False]
 
 
 def test_the_version_does_not_look_for_plugins(packages: tuple[Path, str]) -> None:

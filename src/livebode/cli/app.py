@@ -1,8 +1,7 @@
 """The command line.
 
-Commands: measure (run, demo), look at recordings and runs (inspect, query), evaluate runs (fit, margins, validate,
-learn), export, check the installation (doctor). Exit codes: 0 success, 1 internal error, 2 wrong as it is, 3 no model
-fits, 4 a limit is not met (report --check), 75 what may pass, 130 and above stopped by a signal.
+Exit codes: 0 success, 1 internal error, 2 wrong as it is, 3 no model fits, 4 a limit is not met (report --check), 75
+what may pass, 130 and above stopped by a signal.
 """
 
 from __future__ import annotations

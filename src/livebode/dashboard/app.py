@@ -6,7 +6,7 @@ import tempfile
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from starlette.applications import Starlette
 from starlette.background import BackgroundTask
@@ -106,9 +106,7 @@ def _page_routes(pages: _Pages) -> list[BaseRoute]:
         Route("/api/moment", pages.moment),
         Route("/api/signals", pages.signals),
         Route("/api/export", pages.export),
-        Route("/api/acknowledge", pages.acknowledge, methods=["POST"]),
-        Route("/api/shelve", pages.shelve, methods=["POST"]),
-        Route("/api/unshelve", pages.unshelve, methods=["POST"]),
+        *(Route(f"/api/{act}", partial(pages.act, act), methods=["POST"]) for act in get_args(Act)),
         Route("/api/saved", pages.saved, methods=["GET"]),
         Route("/api/saved", pages.change_saved, methods=["POST"]),
         WebSocketRoute("/live", pages.live),
@@ -223,16 +221,8 @@ class _Pages:
             path, media_type=_TYPES[span.format], filename=name, background=BackgroundTask(remove_created, path)
         )
 
-    async def acknowledge(self, request: Request) -> Response:
-        return await self._act(request, "acknowledge")
-
-    async def shelve(self, request: Request) -> Response:
-        return await self._act(request, "shelve")
-
-    async def unshelve(self, request: Request) -> Response:
-        return await self._act(request, "unshelve")
-
-    async def _act(self, request: Request, act: Act) -> Response:
+    async def act(self, act: Act, request: Request) -> Response:
+        """Acknowledge, shelve or unshelve an alarm."""
         data = await self.order(request)
         if isinstance(data, Response):
             return data

@@ -47,7 +47,7 @@ class Hub:
         """Time of day of the run's seconds, as in `RunClock`."""
         self.delays_s: deque[float] = deque(maxlen=_DELAYS)
         self.signals = SignalTap()
-        self._lock = threading.Lock()
+        self._lock = threading.Lock()  # the tracking thread appends, the server's thread drains
         self._rows: deque[Responses | tuple[Parameters, ...]] = deque()
         self._values = 0
         self._events: deque[Event] = deque(maxlen=EVENTS_MAX)

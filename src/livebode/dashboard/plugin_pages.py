@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Awaitable, Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
-from livebode.plugins import loaded, named
+from livebode.plugins import PluginWarning, loaded, named
 
 if TYPE_CHECKING:
     from starlette.requests import Request
@@ -95,15 +96,23 @@ class PageAddition(Protocol):
 
 
 def page_additions() -> dict[str, type[PageAddition]]:
-    """The additions of all plug-ins by name."""
-    return {name: loaded(reference) for name, reference in named("pages").items()}
+    """The additions of all plug-ins by name; one that cannot be loaded is left out with a PluginWarning."""
+    additions: dict[str, type[PageAddition]] = {}
+    for name, reference in named("pages").items():
+        try:
+            additions[name] = loaded(reference)
+        except Exception as error:  # whatever the module of somebody else does: the page is needed without it, too
+            reason = f"{type(error).__name__}: {' '.join(str(error).split())}"
+            remedy = "update its plug-in, or remove it"
+            warnings.warn(f"{name!r} is not on the page: {reference} ({reason}); {remedy}", PluginWarning, stacklevel=2)
+    return additions
 
 
 def files_of_additions() -> dict[str, bytes]:
-    """Their static files, with the script that names them to the page, and their styles as one file."""
+    """Static files of the additions, with the script that names them to the page, and their styles as one file."""
     additions = page_additions()
-    files = {path.name: path.read_bytes() for one in additions.values() for path in sorted(one.static.iterdir())}
-    imports = [f'import {{ addition as {name} }} from "./{one.script}";' for name, one in additions.items()]
+    files = {path.name: path.read_bytes() for page in additions.values() for path in sorted(page.static.iterdir())}
+    imports = [f'import {{ addition as {name} }} from "./{page.script}";' for name, page in additions.items()]
     script = "\n".join([*imports, f"export const ADDITIONS = {{ {', '.join(additions)} }};", ""])
     styles = b"".join(content for name, content in files.items() if name.endswith(".css"))
     return files | {"additions.js": script.encode(), "additions.css": styles}

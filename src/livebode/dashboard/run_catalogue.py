@@ -78,7 +78,7 @@ class RunCatalogue:
         self._rows: _CacheEntry[RunEntry] = _CacheEntry()
         self._trends: _CacheEntry[dict[str, Any]] = _CacheEntry()
         self._scanned_s = float("-inf")
-        self._lock = threading.Lock()
+        self._lock = threading.Lock()  # lists and trends are read in other threads than the server's
 
     def path(self, name: str) -> Path:
         """The directory of a listed run; ServerError if there is none of this name."""

@@ -49,7 +49,7 @@ class SignalTap:
     def __init__(self) -> None:
         self.spectra = False
         """Whether the source sends spectra instead of samples."""
-        self._lock = threading.Lock()
+        self._lock = threading.Lock()  # held for references only, never for a copy: the tracking thread waits for it
         self._parts: deque[tuple[int, NDArray[np.float64]]] = deque()
         self._stream: _Stream | None = None
         self._first, self._origin_s = 0, 0.0

@@ -96,7 +96,7 @@ def test_a_check_needs_what_it_compares_and_refuses_options_of_the_other(run: Pa
         ((), "there is nothing to validate; give --on LOG"),
         (("--axis", run.parent / "axis.toml"), "--axis belongs to --loop"),
         (("--loop", "--on", run), "--on and --loop exclude each other"),
-        (("--loop", "--lags", 40), "--lags and --loop exclude each other"),
+        (("--loop", "--samples", 40), "--samples and --loop exclude each other"),
     ):
         refused = livebode("validate", run, *options)
         assert (refused.code, sentence in refused.err) == (2, True), refused
