@@ -192,7 +192,7 @@ def _optional_time(message: Mapping[str, Any]) -> float | None:
 def saved_change(data: bytes, axes: int) -> SavedChange:
     """Parse a change of what is saved with a run; LivebodeError if it is invalid.
 
-    >>> saved_change(b'{"axis": 0, "kind": "annotation", "text": "belt", "frequency_hz": 62.5}', axes=1).at
+    >>> saved_change(b'{"axis": 0, "kind": "annotation", "text": "belt", "frequency_hz": 62.5}', axes=1).value
     62.5
     """
     message = json_object(data)

@@ -107,7 +107,7 @@ def example_run(directory: str | PathLike[str], seconds: float = 1.0) -> Run:
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     run = example_run(f"{folder}/monday")
     ...     sorted(path.name for path in run.path.iterdir())
-    ['events.jsonl', 'parameters.parquet', 'responses.parquet', 'run-copy.json', 'run.json']
+    ['events.jsonl', 'manifest.jsonl', 'parameters.parquet', 'responses.parquet', 'run-copy.json', 'run.json']
     """
     place = Path(directory)
     place.parent.mkdir(parents=True, exist_ok=True)
