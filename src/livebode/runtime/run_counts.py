@@ -53,8 +53,6 @@ _STATES = {"backlog", "backlog-cleared", "restart", "replaced", "disconnected", 
 _STATES |= {"suppressed", "suppression-ended"}
 """Changes of state; they are reported soon, because the record shows the previous state until then."""
 
-_GROUPS_STAGE = Stage("event-groups", 1)
-
 
 @dataclass
 class _Group:
@@ -145,6 +143,8 @@ class EventGroups:
     [30]
     """
 
+    _stage = Stage("event-groups", 1)
+
     def __init__(self) -> None:
         self._groups: dict[str, _Group] = {}
         self._silent_s: dict[str, float] = {}  # start of waiting of each cause, in `due_while_silent`
@@ -203,11 +203,11 @@ class EventGroups:
 
     def snapshot(self) -> bytes:
         """State as bytes; see `restore`."""
-        return encode(_GROUPS_STAGE, {"groups": {cause: asdict(group) for cause, group in self._groups.items()}})
+        return encode(self._stage, {"groups": {cause: asdict(group) for cause, group in self._groups.items()}})
 
     def restore(self, snapshot: bytes) -> None:
         """Continue from a snapshot; StateError, and nothing has changed, if that cannot be restored."""
-        groups = decode(_GROUPS_STAGE, snapshot)["groups"]
+        groups = decode(self._stage, snapshot)["groups"]
         self._groups = {cause: _restored(group) for cause, group in groups.items()}
 
 

@@ -25,6 +25,7 @@ from livebode.records.segments.journal import Commit
 from livebode.records.segments.limits import JOURNALS, SegmentLimits
 from livebode.records.segments.lock import Lock
 from livebode.records.segments.manifest import Manifest
+from livebode.records.segments.merging import merged_bytes_max
 from livebode.records.segments.phase import Phase
 from livebode.records.segments.recovery import EVENTS, UnfinishedRun, recover
 from livebode.records.segments.shelf import Shelf, Tiers, no_tiers
@@ -323,7 +324,8 @@ class Store:
     def _begin_closing(self) -> None:
         budget = self.limits.budget_bytes
         used = self._events.length + JOURNALS * self.limits.journal_bytes_max
-        self._closing.begin(None if budget is None else budget - used)
+        # Beside the journals: a segment with those that were merged into it, and new lines of the manifest.
+        self._closing.begin(None if budget is None else budget - used - merged_bytes_max(budget))
 
     def _closed(self) -> OSError | LivebodeError | None:
         """Wait until the previous journal is converted, and report removed and damaged parts; returns an error."""
