@@ -106,3 +106,12 @@ def test_the_page_of_the_doctor_lists_the_loggers() -> None:
     sources = {f"sources.live.{path.stem}" for path in ROOT.glob("wings/*/src/*/live/*.py")}
     assert [name for name in listed if not any(fnmatch(one, name) for one in {*modules.values(), *sources})] == []
     assert [one for one in logging if not any(fnmatch(one, name) for name in listed)] == []
+
+
+def test_the_layers_on_the_page_are_those_that_the_imports_are_checked_with() -> None:
+    page = (ROOT / "docs" / "explanation" / "architecture.md").read_text("utf-8")
+    rows = re.findall(r"^\| (\d+) \| ((?:`\w+`(?:, )?)+) \|", page, re.M)
+    contracts = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["importlinter"]["contracts"]
+    layers = [set(layer.split(" | ")) for layer in contracts[0]["layers"]]
+    assert [set(re.findall(r"\w+", packages)) for _, packages in rows] == layers
+    assert [int(number) for number, _ in rows] == list(reversed(range(len(layers))))
