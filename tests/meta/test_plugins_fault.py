@@ -100,6 +100,13 @@ def test_a_page_without_an_addition_that_cannot_be_loaded_has_the_others(monkeyp
     assert [name in files["additions.js"].decode() for name in ("whatIf", "other")] == [True, False]
 
 
+def test_the_help_has_the_same_sentence(packages: tuple[Path, str], broken: dict[str, Answer]) -> None:
+    done = livebode(packages[0], "--help")
+    assert "Fit a model to the response of a run" in done.stdout
+    (line,) = done.stderr.splitlines()
+    assert line in broken["run"].err.splitlines()
+
+
 def test_the_version_does_not_look_for_plugins(packages: tuple[Path, str]) -> None:
     done = livebode(packages[0], "--version")
     assert (done.returncode, done.stderr) == (0, "")
