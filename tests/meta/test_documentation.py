@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 import typer
 
+from livebode.analysis import ALARMS
 from livebode.cli.app import app
 from livebode.plugins import GROUPS
 
@@ -115,3 +116,9 @@ def test_the_layers_on_the_page_are_those_that_the_imports_are_checked_with() ->
     layers = [set(layer.split(" | ")) for layer in contracts[0]["layers"]]
     assert [set(re.findall(r"\w+", packages)) for _, packages in rows] == layers
     assert [int(number) for number, _ in rows] == list(reversed(range(len(layers))))
+
+
+def test_the_page_of_runs_names_the_alarms_that_a_trend_counts() -> None:
+    page = (ROOT / "docs" / "how-to" / "runs.md").read_text("utf-8")
+    sentence = page.partition("- **Alarms**")[2].partition("\n- ")[0]
+    assert re.findall("`([a-z-]+)`", sentence) == list(ALARMS)
