@@ -53,6 +53,14 @@ MISTAKES = [
     ("run log.csv --excitation w --input u --output y --lines 900 --window 100", "Nyquist"),
     ("run log.csv --excitation w --input u --output y --window 0.1", "neither a whole number"),
     ("run log.csv --excitation w --input u --output y --window 9999", "less than the window"),
+    (
+        "run log.csv --excitation w --input u --output y --window 0",
+        "lines.window = 0 is not usable: input should be greater than or equal to 3",
+    ),
+    (
+        "run log.csv --excitation w --input u --output y --window=-1",
+        "lines.window = -1 is not usable: input should be greater than or equal to 3",
+    ),
     ("run log.csv --excitation w --input u --output y --rate 500", "correct rate_hz"),
     ("run log.csv --excitation w --input u --output y --from 99", "choose other limits"),
     ("run log.csv --excitation w --input u --output y --estimator jont", "'joint'"),

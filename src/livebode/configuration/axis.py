@@ -33,6 +33,7 @@ from livebode.sources.live import SourceSettings
 NOT_RECORDED = {"serve", "publish"}
 """Sections that are about this computer and its network, and change no result: run.json has none of them."""
 SINKS_MAX = 32
+_UNION = {"int", "str", "constrained-int", "constrained-str"}
 MAY_BE_SECRET = {
     *("url", "username", "password_env", "password_file"),
     *("token_env", "token_file", "viewer_token_env", "viewer_token_file"),
@@ -258,9 +259,7 @@ def _first_of(error: ValidationError) -> ConfigError:
     if first["loc"][:1] == ("report",):
         return report_error(first)
     # After a union, pydantic adds the name of the type that it tried.
-    place = one_line(
-        ".".join(str(part) for part in first["loc"] if part not in ("int", "str") and "[" not in str(part))
-    )
+    place = one_line(".".join(str(part) for part in first["loc"] if part not in _UNION and "[" not in str(part)))
     if first["type"] == "extra_forbidden":
         return ConfigError("key-unknown", f"there is no setting {place!r}", nearest(first["loc"]), key=place)
     if first["type"] == "missing":

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, Field
 
 from livebode.configuration.section import ConfigurationSection, Positive
-from livebode.core import CHANNELS_MAX, ConfigError, Quantity
+from livebode.core import CHANNELS_MAX, WINDOW_MAX, ConfigError, Quantity
 
 
 def _one_or_several(names: str | list[str]) -> str | list[str]:
@@ -113,7 +113,7 @@ class LinesSection(ConfigurationSection):
     """
 
     frequencies: str = "auto"
-    window: int | Literal["auto"] = "auto"
+    window: Annotated[int, Field(ge=3, le=WINDOW_MAX)] | Literal["auto"] = "auto"
 
 
 class ExperimentsSection(ConfigurationSection):
