@@ -104,13 +104,20 @@ def test_the_report_has_the_newest_proposal_or_says_why_not(run: Path) -> None:
     assert "No controller was proposed" in str(proposed_controller(run))
 
 
-def test_a_bandwidth_out_of_reach_ends_with_the_best_and_exit_code_two(run: Path) -> None:
-    done = livebode("tune", run, "--loop-checked", "--bandwidth-hz", 300, "--json")
+@pytest.mark.parametrize("bandwidth_hz", [300, 1e6])
+def test_a_bandwidth_out_of_reach_ends_with_the_best_and_exit_code_two(run: Path, bandwidth_hz: float) -> None:
+    done = livebode("tune", run, "--loop-checked", "--bandwidth-hz", bandwidth_hz, "--json")
     assert done.code == 2
     found = json.loads(done.out.splitlines()[0])
     assert not found["met"]
     assert found["limited_by"]
     assert "the best promises" in done.out + done.err
+
+
+def test_a_bandwidth_below_the_grid_is_answered_by_the_lines_that_it_needs(run: Path) -> None:
+    done = livebode("tune", run, "--loop-checked", "--bandwidth-hz", 1e-6)
+    assert done.code == 2
+    assert "and the lowest line is 4 Hz; add the lines" in done.err
 
 
 def proposed(run: Path, *options: object) -> Any:
