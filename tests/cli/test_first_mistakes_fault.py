@@ -53,6 +53,8 @@ MISTAKES = [
     ("run log.csv --excitation w --input u --output y --lines 900 --window 100", "Nyquist"),
     ("run log.csv --excitation w --input u --output y --window 0.1", "neither a whole number"),
     ("run log.csv --excitation w --input u --output y --window 9999", "less than the window"),
+    ("run log.csv --excitation w --input u --output y --schedule=", "signals.schedule = '' is not usable"),
+    ("inspect log.csv --excitation w --skip-periods=-1", "skip_periods=-1 is less than 0"),
     (
         "run log.csv --excitation w --input u --output y --window 0",
         "lines.window = 0 is not usable: input should be greater than or equal to 3",
