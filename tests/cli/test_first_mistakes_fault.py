@@ -36,6 +36,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "text.txt").write_text("Dear reader,\nthis is a letter.\n")
     (folder / "directory").mkdir()
     (folder / "key.toml").write_text('[source]\nlog = "log.csv"\n[signals]\nexcitaton = "w"\noutput = "y"\n')
+    (folder / "section.toml").write_text('[source]\nlog = "log.csv"\n[tracking]\nlines = "20"\n')
     (folder / "broken.toml").write_text("[source\n")
     write_csv(folder / "log.csv", signals())
     roles = ("--excitation", "w", "--input", "u", "--output", "y")
@@ -79,6 +80,7 @@ MISTAKES = [
     ("inspect text.txt", "no row of numbers"),
     ("inspect directory", "is a directory"),
     ("run key.toml", "did you mean 'excitation'?"),
+    ("run section.toml", "[lines] is a section of its own, with the settings frequencies, window\n"),
     ("run broken.toml", "is not TOML"),
     ("fit runs/nope", "there is no directory 'runs/nope'; Runs in runs: monday"),
     ("fit runs/mondy", "did you mean 'monday'?"),

@@ -277,14 +277,25 @@ def _is_less_helpful(error: ErrorDetails) -> tuple[bool, bool]:
 
 
 def nearest(loc: tuple[int | str, ...]) -> str:
-    """Suggestion for an unknown key at this place of an axis."""
+    """Suggestion for an unknown key at this place of an axis: its section, if it is one, or the nearest key."""
+    if loc[1:] and loc[-1] in Axis.model_fields:
+        kind = _section_at((loc[-1],))
+        return f"[{loc[-1]}] is a section of its own, with the settings {', '.join(_names(kind))}"
+    return nearest_name(str(loc[-1]), _names(_section_at(loc[:-1])), "Settings")
+
+
+def _names(section: type[BaseModel]) -> list[str]:
+    return [field.alias or name for name, field in section.model_fields.items()]
+
+
+def _section_at(loc: tuple[int | str, ...]) -> type[BaseModel]:
     section: Any = Axis
-    for part in (part for part in loc[:-1] if isinstance(part, str)):
+    for part in (part for part in loc if isinstance(part, str)):
         annotation = section.model_fields[part].annotation
         section = next(
             c
             for c in (annotation, *getattr(annotation, "__args__", ()))
             if isinstance(c, type) and issubclass(c, BaseModel)
         )
-    names = [field.alias or name for name, field in section.model_fields.items()]
-    return nearest_name(str(loc[-1]), names, "Settings")
+    assert issubclass(section, BaseModel)
+    return section
