@@ -16,7 +16,9 @@ import pytest
 
 from livebode import Run
 from livebode.core import DamageWarning, RecordError
-from livebode.records import RunRecord
+from livebode.dashboard.run_catalogue import runs_in
+from livebode.dashboard.run_entry import entry
+from livebode.records import RunRecord, delete
 from tests.support.command import livebode, signals, write_csv
 from tests.support.damaged import check_damage, make_runs, record_run, seen
 from tests.support.file_damage import KINDS
@@ -146,3 +148,41 @@ def test_damage_that_loses_no_row_is_no_reason_for_an_absent_table(
     done = livebode("export", run, "--sql", "FROM parameters")
     assert "nothing is lost" in done.err
     assert "query the tables of this run: events, single_events, responses" in done.err
+
+
+def test_a_run_without_run_json_is_read_from_the_copy_listed_replaced_and_deleted(
+    recorded: tuple[list[object], Path], tmp_path: Path
+) -> None:
+    track, whole = recorded
+    run = shutil.copytree(whole, tmp_path / "runs" / "run")
+    (run / "run.json").unlink()
+    done = livebode("export", run, "--sql", "SELECT count(*) FROM responses", "--csv")
+    assert (done.code, int(done.out.split()[1]) > 0) == (0, True)
+    assert f"{str(run / 'run.json')!r} is missing; its copy run-copy.json is read instead" in done.err
+    assert runs_in(run.parent) == ["run"]
+    assert entry(run).state == "finished"
+
+    files = {path.name for path in whole.iterdir()}
+    again = [*(run if value == whole else value for value in track), "--force"]
+    (run / "mine.txt").write_text("mine")
+    refused = livebode(*again)
+    assert (refused.code, "files that livebode did not write: mine.txt" in refused.err) == (2, True)
+    assert {path.name for path in run.iterdir()} == files - {"run.json"} | {"mine.txt"}
+    (run / "mine.txt").unlink()
+    assert livebode(*again).code == 0
+    assert {path.name for path in run.iterdir()} == files
+
+    (run / "run.json").unlink()
+    deleted = delete(run)
+    assert (deleted / "run-copy.json").exists()
+    (deleted / "run-copy.json").unlink()
+    neither = livebode("fit", deleted)
+    assert (neither.code, "it has no run.json" in neither.err) == (2, True)
+
+
+def test_a_killed_run_without_run_json_continues(runs: dict[str, Path], tmp_path: Path) -> None:
+    run = shutil.copytree(runs["killed"], tmp_path / "run")
+    (run / "run.json").unlink()
+    record_run(run)
+    assert RunRecord.open(run).finished
+    assert len(RunRecord.open(run).responses()) == len(RunRecord.open(runs["segments"]).responses())
