@@ -56,9 +56,11 @@ def check_removable(path: Path) -> None:
     read_summary(path)
     if others := foreign(path):
         named = ", ".join(others[:_SHOWN]) + f" and {len(others) - _SHOWN} more" * (len(others) > _SHOWN)
+        runs = all(is_run(path / name) for name in others)
+        what = "other runs" if runs else "files that livebode did not write"
         raise RecordError(
             "foreign-files",
-            f"{str(path)!r} is not replaced, because it contains files that livebode did not write: {named}",
+            f"{str(path)!r} is not replaced, because it contains {what}: {named}",
             "move them away, or choose another path",
             path=str(path),
             files=others,
