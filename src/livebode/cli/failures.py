@@ -90,7 +90,8 @@ def name_options(error: LivebodeError, parameters: Iterable[Any]) -> None:
         for parameter in parameters
         if parameter.param_type_name == "option"
     }
-    names = [error.facts.get("argument"), error.facts.get("key"), *_OPTIONS_BY_CODE.get(error.code, ())]
+    key = None if error.code == "config.key-unknown" else error.facts.get("key")  # no option sets it
+    names = [error.facts.get("argument"), key, *_OPTIONS_BY_CODE.get(error.code, ())]
     options = [option for name in names if name and (option := _option(str(name), known))]
     if options:
         error.facts.setdefault("options", list(dict.fromkeys(options)))

@@ -40,7 +40,9 @@ def validate_command(
     ] = None,
     model: Annotated[
         list[str] | None,
-        typer.Option(help="rigid, two-mass, … modal; repeat to compare. \\[default: the run's \\[fit]]"),
+        typer.Option(
+            help="rigid, two-mass, … modal, rational or auto; repeat to compare. \\[default: the run's \\[fit]]"
+        ),
     ] = None,
     samples: Annotated[int | None, typer.Option(min=1, help="Use only the last ones. \\[default: all]")] = None,
     output: Output = None,
@@ -93,10 +95,12 @@ def _validate_model(
 ) -> None:  # fmt: skip
     """Test the models on a recording or another run, write their picture, and print the verdicts."""
     from livebode.cli import tell_how_to_draw
-    from livebode.configuration import FitSection, recorded_configuration
+    from livebode.configuration import FitSection, check_model, recorded_configuration
     from livebode.records import RunRecord, to_json
     from livebode_control.validation.run_validation import validate_run
 
+    for name in models:
+        check_model(name)
     base = recorded_configuration(RunRecord.open(directory, entry=entry).summary).get("fit", {})
     named = [{"model": name} for name in models] or [{}]
     sections = [FitSection.model_validate(base | section) for section in named]
@@ -140,12 +144,13 @@ def _validate_model(
 def _reason(section: FitSection, on: Path, at_lines: bool, entry: str | None) -> str:
     """Why a model is judged at the lines from the beginning; empty for one that is simulated."""
     from livebode.fitting import POLE_MODELS
+    from livebode.records import is_run
 
     if entry is not None:
         return "the other inputs of a matrix move the output too"
     if at_lines:
         return "--at-lines asks for it"
-    if (on / "run.json").exists():
+    if is_run(on):
         return f"{on.name} is a run, not a recording"
     return f"a {section.model} model is not simulated" if section.model in POLE_MODELS else ""
 
@@ -173,10 +178,11 @@ def _at_lines(
     """On another run; a recording is tracked as the run was, in a directory that is removed."""
     from tempfile import TemporaryDirectory
 
+    from livebode.records import is_run
     from livebode.runtime import Destination, run
     from livebode_control.validation.line_validation import validate_run_at_lines
 
-    if (on / "run.json").exists():
+    if is_run(on):
         return validate_run_at_lines(directory, on, sections, drifting, entry)
     with TemporaryDirectory() as there:
         other = Path(there) / on.stem
