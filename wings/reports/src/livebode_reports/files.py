@@ -31,8 +31,8 @@ def write_documents(document: Document, out: Path, *, force: bool) -> tuple[list
     from livebode_reports.svg import pictures_svg
 
     if out.suffix.lower() in _OTHERS:
-        wrong = f"--out={str(out)!r} is neither an .html nor a .pdf"
-        raise UsageError("unreadable", wrong, "choose one of them, or omit the ending", argument="--out")
+        remedy = "choose one of them, or omit the ending"
+        raise UsageError("unreadable", f"{out} is neither .html nor .pdf", remedy, argument="out")
     base = out.with_suffix("") if out.suffix.lower() in (".html", ".pdf") else out
     page, paper = (base.with_name(base.name + ending) for ending in (".html", ".pdf"))
     check_free(paper, force=force)

@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from livebode_plant.lake import Lake
     from livebode_plant.trending import Assessment, Ranked, Selection
 
-_OF_ONE = (".png", ".csv")
-
 
 @with_selection("by", "below", "since", "until", "covariate", "recipe")
 def trend_command(
@@ -60,17 +58,15 @@ def trend_command(
     from livebode_plant.lake import Lake
     from livebode_plant.trending import assess, history
 
-    _check(quantity, {"--by": chosen.by is not None, "--dark": dark}, {"--name": name, "--language": language})
+    picture = out is not None and out.suffix.lower() in (".png", ".csv")
+    of_one = {"--by": chosen.by is not None, "--dark": dark, f"--out={str(out)!r}": picture}
+    _check(quantity, of_one, {"--name": name, "--language": language})
     lake = Lake(lake_url(archive))
-    ending = out.suffix.lower() if out else ""
     if quantity is None:
-        if ending in _OF_ONE:
-            remedy = "name a QUANTITY, or write .html"
-            raise UsageError("conflict", f"--out={str(out)!r} is for one quantity", remedy, argument="--out")
         pages = out or Path("hall-report")
         write_hall_pages(lake, chosen.selection(), name, limit, language or "en", pages, force=force, as_json=as_json)
         return
-    if out is not None and ending not in _OF_ONE:
+    if out is not None and not picture:
         raise UsageError(
             "unreadable", f"--out={str(out)!r} is neither a .png nor a .csv", "choose one of them", argument="--out"
         )
@@ -92,7 +88,9 @@ def _check(quantity: str | None, of_one: dict[str, Any], of_all: dict[str, Any])
     if given:
         result = "one quantity" if quantity is None else "the page of all quantities"
         remedy = "name a QUANTITY" if quantity is None else "leave out the QUANTITY"
-        raise UsageError("conflict", f"{given[0]} is for {result}", f"{remedy}, or omit it", options=given[:1])
+        raise UsageError(
+            "conflict", f"{given[0]} is for {result}", f"{remedy}, or omit it", options=[given[0].partition("=")[0]]
+        )
 
 
 def plain(of: Assessment) -> dict[str, Any]:
