@@ -85,6 +85,9 @@ def test_a_kind_with_a_model_error_of_30_percent_is_refused_in_one_sentence(
     assert found.status == status
     if status != "ok":
         assert "as a velocity the output differs from the rigid model by" in found.sentence
+        assert found.sentence.endswith("so its parameters have no meaning"), (
+            "the advice is the remedy of what needs a fit"
+        )
         assert np.isnan(found["J"])
         assert plain_fit(found)["message"] == found.sentence
 

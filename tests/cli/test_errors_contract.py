@@ -69,6 +69,14 @@ def test_a_missing_argument_is_reported_as_an_object_too() -> None:
     assert error_of(livebode("fit", "--json"))["code"] == "usage.options"
 
 
+@pytest.mark.parametrize("words", ["--log-level foo run log.csv", "doctor --receivers foo", "archive run --retry foo"])
+def test_a_wrong_choice_is_reported_without_the_name_of_the_error(words: str) -> None:
+    refused = livebode(*words.split())
+    assert refused.code == 2
+    assert "'foo' is not one of" in refused.err
+    assert "Value error" not in refused.err + livebode(*words.split(), "--json").err
+
+
 def test_without_json_an_error_is_one_line_with_its_option(tmp_path: Path) -> None:
     result = livebode("run", tmp_path / "log.csv", "--output", "y", "--window", "long")
     assert (result.code, result.err.count("\n")) == (2, 1)

@@ -36,6 +36,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "text.txt").write_text("Dear reader,\nthis is a letter.\n")
     (folder / "directory").mkdir()
     (folder / "key.toml").write_text('[source]\nlog = "log.csv"\n[signals]\nexcitaton = "w"\noutput = "y"\n')
+    (folder / "section.toml").write_text('[source]\nlog = "log.csv"\n[tracking]\nlines = "20"\n')
     (folder / "broken.toml").write_text("[source\n")
     write_csv(folder / "log.csv", signals())
     roles = ("--excitation", "w", "--input", "u", "--output", "y")
@@ -53,6 +54,16 @@ MISTAKES = [
     ("run log.csv --excitation w --input u --output y --lines 900 --window 100", "Nyquist"),
     ("run log.csv --excitation w --input u --output y --window 0.1", "neither a whole number"),
     ("run log.csv --excitation w --input u --output y --window 9999", "less than the window"),
+    ("run log.csv --excitation w --input u --output y --schedule=", "signals.schedule = '' is not usable"),
+    ("inspect log.csv --excitation w --skip-periods=-1", "skip_periods=-1 is less than 0"),
+    (
+        "run log.csv --excitation w --input u --output y --window 0",
+        "lines.window = 0 is not usable: input should be greater than or equal to 3",
+    ),
+    (
+        "run log.csv --excitation w --input u --output y --window=-1",
+        "lines.window = -1 is not usable: input should be greater than or equal to 3",
+    ),
     ("run log.csv --excitation w --input u --output y --rate 500", "correct rate_hz"),
     ("run log.csv --excitation w --input u --output y --from 99", "choose other limits"),
     ("run log.csv --excitation w --input u --output y --estimator jont", "'joint'"),
@@ -69,6 +80,7 @@ MISTAKES = [
     ("inspect text.txt", "no row of numbers"),
     ("inspect directory", "is a directory"),
     ("run key.toml", "did you mean 'excitation'?"),
+    ("run section.toml", "[lines] is a section of its own, with the settings frequencies, window\n"),
     ("run broken.toml", "is not TOML"),
     ("fit runs/nope", "there is no directory 'runs/nope'; Runs in runs: monday"),
     ("fit runs/mondy", "did you mean 'monday'?"),

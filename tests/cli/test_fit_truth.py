@@ -117,6 +117,7 @@ def test_a_fit_without_a_result_reports_its_reason(machine: Path) -> None:
     ("options", "message"),
     [
         (("--model", "two"), "there is no model 'two'"),
+        (("--model", "two"), "choose auto, rigid, two-mass, three-mass, two-mass-gain, modal, rational"),
         (("--fix", "Js"), "is not NAME=VALUE"),
         (("--band", "20-40"), "is not LOW:HIGH"),
         (("--output", "torque"), "fit.output = 'torque'"),

@@ -71,6 +71,18 @@ def test_exchanged_roles_are_refused_and_nothing_is_written(folder: Path) -> Non
     assert not out.exists()
 
 
+@pytest.mark.parametrize(
+    ("model", "sentence"),
+    [("foo", "there is no model 'foo'; choose auto, rigid"), ("modal", "is fitted to finished runs only")],
+)
+def test_a_model_that_a_run_would_refuse_is_refused_and_nothing_is_written(
+    folder: Path, model: str, sentence: str
+) -> None:
+    out = folder / "fitted.toml"
+    refused = livebode("inspect", folder / "standstill.csv", "--yes", "--out", out, "--fit", model)
+    assert (refused.code, sentence in refused.err, out.exists()) == (2, True, False)
+
+
 def test_an_existing_file_and_a_missing_terminal_are_one_sentence_each(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -48,7 +48,7 @@ def test_the_help_is_the_description_with_default_and_limits() -> None:
     )
     assert key_help("source.dbc") == "DBC file that defines the signals of CAN frames, live or in a recording."
     assert key_help("tracking.spikes").endswith("windows with a spike are excluded; repeat for several.")
-    assert "controllers in \\[loop]" in key_help("tracking.quantity")
+    assert "use the controllers in \\[loop]; without them" in key_help("tracking.quantity")
 
 
 def test_a_command_receives_the_keys_that_were_specified_and_no_others() -> None:

@@ -17,6 +17,9 @@ REFUSED = [
     ("doctor --out schema.json", "--out belongs to --schema; give --schema NAME too"),
     ("doctor --schema axis --bundle b.zip", "--bundle and --schema exclude each other"),
     ("doctor --receivers test --bundle b.zip", "--bundle and --receivers exclude each other"),
+    ("doctor --schema axis none.toml runs/none", "none.toml and --schema exclude each other"),
+    ("doctor --receivers list axis.toml runs/none", "runs/none and --receivers exclude each other"),
+    ("doctor --receivers list axis.toml other.toml", "other.toml and --receivers exclude each other"),
 ]
 
 

@@ -292,7 +292,13 @@ def test_the_function_block_of_a_feedforward_interpolates_over_the_turn(tmp_path
 def test_wrong_options_of_orders_end_in_a_sentence(example: Path) -> None:
     for arguments, sentence in (
         (("--shaft", "gear"), "the shaft 'gear' cannot be read"),
+        (("--shaft", "=1:1"), "a shaft has no name"),
         (("--time-lines", "a"), "the lines 'a' cannot be read"),
+        (("--time-lines", "20,0"), "the line 0 Hz is not a positive frequency"),
+        (("--time-lines", "nan"), "the line nan Hz is not a positive frequency"),
+        (("--highest", "nan"), "highest_hz=nan is not a positive number"),
+        (("--highest", "0"), "highest_hz=0.0 is not a positive number"),
+        (("--band", "0"), "band_hz=0.0 is out of its range"),
         (("--table", example / "ff.txt"), "does not end in a supported suffix"),
         (("--shaft", "pinion=1.5:1", "--table", example / "other.csv"), "no order of the motor is seen"),
     ):

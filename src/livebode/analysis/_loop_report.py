@@ -142,7 +142,7 @@ def loop_report(fit: Fit, words: str, responses: Responses, loop: Loop) -> LoopR
         raise FitError(
             "not-fitted",
             f"margins need a valid fit: {fit.sentence}",
-            "fit another model",
+            "set fit.output, or fit another model",
             models=[fit.model.name],
         )
     around = OpenLoop(fit.model, loop, fit.rate_hz, fit.hold)

@@ -70,7 +70,7 @@ def _best(of: RunMean, section: FitSection) -> Fit:
     taken = _taken(best)
     return best.refused(
         f"as a {taken} the output differs from the {best.model.name} model by {100 * best.epsilon:.0f} % of |G| (limit "
-        f"{100 * MISFIT_MAX:.0f} %), so its parameters have no meaning: set fit.output, or fit another model"
+        f"{100 * MISFIT_MAX:.0f} %), so its parameters have no meaning"
     )
 
 
@@ -107,7 +107,10 @@ def fit_remarks(of: RunMean, section: FitSection, fitted: Fit, output: str, *, l
                 f"inverted; {'change the sign in the drive' if live else remedy}"
             )
         else:
-            remarks.append("for a machine that is not such a drive, fit its modes: --model modal, or --model rational")
+            remarks.append(
+                "set fit.output, fit another model, or for a machine that is not such a drive, fit its modes: --model "
+                "modal, or --model rational"
+            )
     return remarks
 
 

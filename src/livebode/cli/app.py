@@ -37,6 +37,14 @@ _ENDING = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(si
 class _Light:
     """A command of Typer that loads neither Rich nor pydantic for its help, a completion or a wrong option."""
 
+    def make_context(self, *args: Any, **extra: Any) -> Any:
+        """Make the context; pydantic's name of the error is not part of the sentence."""
+        try:
+            return super().make_context(*args, **extra)  # type: ignore[misc]
+        except typer.TyperException as error:
+            error.message = error.message.removeprefix("Value error, ")
+            raise
+
     def get_params(self, ctx: Any) -> list[Any]:
         """The arguments and options, also --help."""
         found: list[Any] = super().get_params(ctx)  # type: ignore[misc]

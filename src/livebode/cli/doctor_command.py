@@ -11,6 +11,7 @@ from livebode.cli import terminal
 from livebode.cli.file_schema import print_schema
 from livebode.cli.options import Json, check_use
 from livebode.cli.receivers import show_receivers
+from livebode.core import UsageError
 
 if TYPE_CHECKING:
     from livebode.doctor import Check
@@ -59,12 +60,23 @@ def doctor_command(
     check_use(context, "--schema NAME", ("--out",), ("--force",))
     check_use(context, "--receivers list", ())
     if schema is not None:
+        _check_targets(targets or [], "--schema", 0)
         print_schema(schema, out, force=force, as_json=as_json)
     elif receivers is not None:
-        files = [path for path in targets or [] if path.suffix.lower() == ".toml"]
-        show_receivers(files[0] if files else Path("axis.toml"), test=receivers == "test", as_json=as_json)
+        _check_targets(targets or [], "--receivers", 1)
+        show_receivers(targets[0] if targets else Path("axis.toml"), test=receivers == "test", as_json=as_json)
     else:
         _check(targets or [], bundle, runs, force=force, as_json=as_json)
+
+
+def _check_targets(targets: list[Path], option: str, most: int) -> None:
+    """UsageError for more configurations than the option uses, or a run."""
+    configurations = [path for path in targets if path.suffix.lower() == ".toml"][:most]
+    if unused := [str(path) for path in targets if path not in configurations]:
+        raise UsageError(
+            "conflict", f"{unused[0]} and {option} exclude each other", "give one of them",
+            options=[option], argument="targets", value=unused[0],
+        )  # fmt: skip
 
 
 def _check(targets: list[Path], bundle: Path | None, runs: Path, *, force: bool, as_json: bool) -> None:

@@ -73,9 +73,12 @@ def fit_command(
     With modal or rational the outputs of several runs have their poles in common, and so do all entries of a matrix run
     (rational by default). Defaults are from the run's \\[fit] section. Exit code 3 if no model fits.
     """
+    from livebode.configuration import check_model
     from livebode.fitting import POLE_MODELS, Kind
     from livebode.records import RunRecord
 
+    if model is not None:
+        check_model(model)
     given: dict[str, Any] = {
         "model": model,
         "output": output,

@@ -66,7 +66,7 @@ def inspect_command(
         typer.Option(metavar="HZ", help="Lines that you plan to measure, as in run: search for mains hum near them."),
     ] = None,
     window: Annotated[
-        int | None, typer.Option(metavar="SAMPLES", help="Window that you plan for these lines.", min=1)
+        int | None, typer.Option(metavar="SAMPLES", help="Window that you plan for these lines.", min=3)
     ] = None,
     rate: Rate = None,
     time: Time = None,

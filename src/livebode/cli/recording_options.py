@@ -13,5 +13,5 @@ Rate = Annotated[float | None, typer.Option(metavar="HZ", help=key_help("source.
 Time = Annotated[str | None, typer.Option(metavar="COLUMN", help=key_help("source.time"))]
 From = Annotated[str | None, typer.Option("--from", metavar="MOMENT", help=key_help("source.from"))]
 To = Annotated[str | None, typer.Option("--to", metavar="MOMENT", help=key_help("source.to"))]
-SkipPeriods = Annotated[int | None, typer.Option(metavar="N", min=0, help=key_help("source.skip_periods"))]
+SkipPeriods = Annotated[int | None, typer.Option(metavar="N", help=key_help("source.skip_periods"))]
 Dbc = Annotated[Path | None, typer.Option(metavar="FILE", help=key_help("source.dbc"))]

@@ -12,6 +12,8 @@ from livebode.configuration.descriptions import documented as documented
 from livebode.configuration.file_kinds import FileKind as FileKind
 from livebode.configuration.file_kinds import kind_of_file as kind_of_file
 from livebode.configuration.fit_section import FitSection as FitSection
+from livebode.configuration.fit_section import check_fit as check_fit
+from livebode.configuration.fit_section import check_model as check_model
 from livebode.configuration.fit_section import chosen_model as chosen_model
 from livebode.configuration.fit_section import fit_settings as fit_settings
 from livebode.configuration.fit_section import fitter_of as fitter_of

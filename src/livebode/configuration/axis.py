@@ -33,6 +33,7 @@ from livebode.sources.live import SourceSettings
 NOT_RECORDED = {"serve", "publish"}
 """Sections that are about this computer and its network, and change no result: run.json has none of them."""
 SINKS_MAX = 32
+_UNION = {"int", "str", "constrained-int", "constrained-str"}
 MAY_BE_SECRET = {
     *("url", "username", "password_env", "password_file"),
     *("token_env", "token_file", "viewer_token_env", "viewer_token_file"),
@@ -258,9 +259,7 @@ def _first_of(error: ValidationError) -> ConfigError:
     if first["loc"][:1] == ("report",):
         return report_error(first)
     # After a union, pydantic adds the name of the type that it tried.
-    place = one_line(
-        ".".join(str(part) for part in first["loc"] if part not in ("int", "str") and "[" not in str(part))
-    )
+    place = one_line(".".join(str(part) for part in first["loc"] if part not in _UNION and "[" not in str(part)))
     if first["type"] == "extra_forbidden":
         return ConfigError("key-unknown", f"there is no setting {place!r}", nearest(first["loc"]), key=place)
     if first["type"] == "missing":
@@ -278,14 +277,25 @@ def _is_less_helpful(error: ErrorDetails) -> tuple[bool, bool]:
 
 
 def nearest(loc: tuple[int | str, ...]) -> str:
-    """Suggestion for an unknown key at this place of an axis."""
+    """Suggestion for an unknown key at this place of an axis: its section, if it is one, or the nearest key."""
+    if loc[1:] and loc[-1] in Axis.model_fields:
+        kind = _section_at((loc[-1],))
+        return f"[{loc[-1]}] is a section of its own, with the settings {', '.join(_names(kind))}"
+    return nearest_name(str(loc[-1]), _names(_section_at(loc[:-1])), "Settings")
+
+
+def _names(section: type[BaseModel]) -> list[str]:
+    return [field.alias or name for name, field in section.model_fields.items()]
+
+
+def _section_at(loc: tuple[int | str, ...]) -> type[BaseModel]:
     section: Any = Axis
-    for part in (part for part in loc[:-1] if isinstance(part, str)):
+    for part in (part for part in loc if isinstance(part, str)):
         annotation = section.model_fields[part].annotation
         section = next(
             c
             for c in (annotation, *getattr(annotation, "__args__", ()))
             if isinstance(c, type) and issubclass(c, BaseModel)
         )
-    names = [field.alias or name for name, field in section.model_fields.items()]
-    return nearest_name(str(loc[-1]), names, "Settings")
+    assert issubclass(section, BaseModel)
+    return section

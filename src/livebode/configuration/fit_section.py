@@ -8,7 +8,8 @@ from pydantic import Field
 
 from livebode import fitting
 from livebode.configuration.section import ConfigurationSection, Positive
-from livebode.core import ConfigError, PlantKinds
+from livebode.core import ConfigError, PlantKinds, UsageError
+from livebode.plugins import named
 
 
 def fitter_of(section: FitSection, kinds: PlantKinds) -> fitting.Fitter:
@@ -22,6 +23,20 @@ def check_fit(section: FitSection) -> None:
         fitter_of(section, PlantKinds())
 
 
+def check_model(name: str, *, finished: bool = True) -> None:
+    """UsageError if there is no such model, with the names of all; those of poles are for `finished` runs only."""
+    models = ["auto", *named("models"), *(fitting.POLE_MODELS if finished else ())]
+    if name not in models:
+        raise UsageError(
+            "unknown-name",
+            f"there is no model {name!r}",
+            f"choose {', '.join(models)}",
+            argument="model",
+            value=name,
+            allowed=models,
+        )
+
+
 def chosen_model(section: FitSection, kinds: PlantKinds) -> fitting.PhysicalModel:
     """The section's model; "auto" is two masses if the input is a torque, else two masses with an unknown gain.
 
@@ -30,6 +45,8 @@ def chosen_model(section: FitSection, kinds: PlantKinds) -> fitting.PhysicalMode
 
     Raises
     ------
+    UsageError
+        If there is no such model.
     ConfigError
         If the section specifies modes or poles; if it does not specify the output, and its kind is neither a velocity
         nor a position; or if it specifies a model in SI units and a unit is not one.
@@ -43,6 +60,7 @@ def chosen_model(section: FitSection, kinds: PlantKinds) -> fitting.PhysicalMode
             key="fit.model",
             value=name,
         )
+    check_model(name, finished=False)
     if name == "auto":
         name = "two-mass" if kinds.si and (kinds.input == "torque" or section.radius_m) else "two-mass-gain"
     elif name != "two-mass-gain" and not kinds.si:

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, Field
 
 from livebode.configuration.section import ConfigurationSection, Positive
-from livebode.core import CHANNELS_MAX, ConfigError, Quantity
+from livebode.core import CHANNELS_MAX, WINDOW_MAX, ConfigError, Quantity
 
 
 def _one_or_several(names: str | list[str]) -> str | list[str]:
@@ -16,8 +16,9 @@ def _one_or_several(names: str | list[str]) -> str | list[str]:
     return names[0] if isinstance(names, list) and len(names) == 1 else names
 
 
+Channel = Annotated[str, Field(min_length=1)]
 Channels = Annotated[
-    str | Annotated[list[str], Field(min_length=1, max_length=CHANNELS_MAX)], AfterValidator(_one_or_several)
+    Channel | Annotated[list[Channel], Field(min_length=1, max_length=CHANNELS_MAX)], AfterValidator(_one_or_several)
 ]
 
 
@@ -48,8 +49,8 @@ class SignalsSection(ConfigurationSection):
     outputs: Channels = Field(alias="output")
     inputs: Channels | None = Field(default=None, alias="input")
     excitations: Channels | None = Field(default=None, alias="excitation")
-    schedule: str | None = None
-    ready: str | None = None
+    schedule: Channel | None = None
+    ready: Channel | None = None
 
     @property
     def output(self) -> str:
@@ -113,7 +114,7 @@ class LinesSection(ConfigurationSection):
     """
 
     frequencies: str = "auto"
-    window: int | Literal["auto"] = "auto"
+    window: Annotated[int, Field(ge=3, le=WINDOW_MAX)] | Literal["auto"] = "auto"
 
 
 class ExperimentsSection(ConfigurationSection):
@@ -192,8 +193,8 @@ class TrackingSection(ConfigurationSection):
         controllers in [loop]. For noise and single chirps, which do not repeat: "lpm" (local polynomial method) or
         "welch".
     quantity
-        The response that is estimated: "plant", "open loop", "closed loop" or "sensitivity". All but "plant" need the
-        controllers in [loop].
+        The response that is estimated: "plant", "open loop", "closed loop" or "sensitivity". All but "plant" use the
+        controllers in [loop]; without them, their action in the recorded signals, which "direct" cannot.
     hop
         Samples between responses. Default: for a recording a twentieth of the window, for a live source 20 responses
         per second; the nearest divisor of the window.

@@ -201,7 +201,7 @@ def friction_curve(
     Biased where friction depends on something else, such as load or temperature; by an elasticity that swings within
     the band; and by noise of a position that is not small against the travel of a kernel.
     """
-    _check(places, band_hz, slowest)
+    _check(places, slowest)
     motion = SmoothMotion.of(block, input, output, kind, band_hz, slowest)
     top = float(np.max(np.abs(motion.velocity)))
     used = motion.standing < _STANDING
@@ -224,10 +224,9 @@ def friction_curve(
     return _curve(names, regression, motion, used, positions, block, input, output, kind)
 
 
-def _check(places: int, band_hz: float, slowest: float | None) -> None:
+def _check(places: int, slowest: float | None) -> None:
     for name, value, good in (
         ("places", places, places == 0 or 2 <= places <= 100),
-        ("band_hz", band_hz, 0 < band_hz < np.inf),
         ("slowest", slowest, slowest is None or 0 < slowest < np.inf),
     ):
         if not good:

@@ -41,6 +41,8 @@ class Shaft:
     orders: tuple[int, ...]
 
     def __post_init__(self) -> None:
+        if not self.name.strip():
+            raise UsageError("missing", "a shaft has no name", "write for example gear=0.2:1,2,14", argument="shaft")
         if not (np.isfinite(self.turns) and self.turns > 0):
             raise UsageError(
                 "out-of-range",

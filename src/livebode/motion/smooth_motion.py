@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.arrays import Floats
-from livebode.core import Block, SignalError
+from livebode.core import Block, SignalError, UsageError
 
 OutputKind = Literal["position", "velocity"]
 
@@ -145,7 +145,14 @@ class SmoothMotion:
         ------
         SignalError
             If there are fewer samples than the kernel needs, or it is shorter than two of them.
+        UsageError
+            If the band is not a positive number.
         """
+        if not 0 < band_hz < np.inf:
+            raise UsageError(
+                "out-of-range", f"{band_hz=} is out of its range", "choose a positive number", argument="band_hz",
+                value=band_hz,
+            )  # fmt: skip
         kernel = SmoothKernel(band_hz, block.rate_hz)
         if kernel.sigma < _SAMPLES_MIN:
             most = _HALF_POWER * block.rate_hz / _SAMPLES_MIN

@@ -8,7 +8,7 @@ from typing import Any
 
 import tomli_w
 
-from livebode.configuration import Axis
+from livebode.configuration import Axis, check_fit
 from livebode.core import Lines, LivebodeError, counted
 from livebode.estimation import DETECTION_LINES_MIN
 from livebode.excitation import recognise
@@ -68,6 +68,8 @@ def settled(log: Log, tables: Tables, reasons: Mapping[str, str]) -> Settled:
         If the recording contradicts the roles, or they do not suffice.
     """
     axis = Axis.of(tables, "the answers")
+    if axis.fit is not None:
+        check_fit(axis.fit)
     settings = make_settings(axis, log)
     doubts = roles_in_doubt(axis, log, settings)
     comments = {("signals", role): reason for role, reason in reasons.items()}

@@ -58,8 +58,13 @@ def chosen_part(
     Raises
     ------
     UsageError
-        If no sample would remain.
+        If no sample would remain, or the number of skipped periods is negative.
     """
+    if skip_periods < 0:
+        raise UsageError(
+            "out-of-range", f"{skip_periods=} is less than 0", "choose 0 or more", argument="skip_periods",
+            value=skip_periods,
+        )  # fmt: skip
     limits = [None if given is None else part_limit(given) for given in (begin, end)]
     first, stop = (_fixed(limit, log) for limit in limits)
     part = log if first is None and stop is None else _checked(log, log.first if first is None else first, stop)

@@ -134,7 +134,7 @@ class RunRecord:
             raise RecordError(
                 "no-responses",
                 f"{str(path)!r} is an output-only run: it has modes and no responses",
-                "query its table parameters, or export its parameters",
+                "read its table parameters with livebode export, by SQL or as a file",
                 path=str(path),
             )
         try:

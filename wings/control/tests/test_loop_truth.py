@@ -135,6 +135,7 @@ def test_impossible_options_of_margins_and_validate_are_refused_in_one_sentence(
         (("validate", run, "--on", fresh, "--samples", 10**7), "clean ones in a row"),
         (("validate", run, "--on", tmp_path / "none.parquet"), "none.parquet"),
         (("validate", tmp_path, "--on", fresh), "not the directory of a run"),
+        (("validate", run, "--on", fresh, "--model", "nonsense"), "two-mass-gain, modal, rational"),
         (("margins", tmp_path), "not the directory of a run"),
         (("margins", run, "--model", "nonsense"), "no model 'nonsense'"),
     ):

@@ -52,6 +52,13 @@ def test_options_of_shapers_and_of_gains_exclude_each_other(crane: Path) -> None
         assert f"{option.replace('no-', '')} and --shaper exclude each other" in refused.err
 
 
+def test_an_axis_that_klipper_has_not_is_refused(crane: Path) -> None:
+    (crane / "shaper.cfg").unlink(missing_ok=True)
+    refused = livebode("tune", crane, "--shaper", "--model", "modal", "--klipper-axis", "q")
+    assert (refused.code, "Invalid value for '--klipper-axis': 'q' is not one of" in refused.err) == (2, True)
+    assert not (crane / "shaper.cfg").exists()
+
+
 def test_the_advice_of_a_refusal_is_an_option_that_works(crane: Path) -> None:
     advice = set()
     for model in ((), ("--model", "two-mass-gain"), ("--model", "rational")):

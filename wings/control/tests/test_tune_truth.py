@@ -104,13 +104,35 @@ def test_the_report_has_the_newest_proposal_or_says_why_not(run: Path) -> None:
     assert "No controller was proposed" in str(proposed_controller(run))
 
 
-def test_a_bandwidth_out_of_reach_ends_with_the_best_and_exit_code_two(run: Path) -> None:
-    done = livebode("tune", run, "--loop-checked", "--bandwidth-hz", 300, "--json")
+@pytest.mark.parametrize("bandwidth_hz", [300, 1e6])
+def test_a_bandwidth_out_of_reach_ends_with_the_best_and_exit_code_two(run: Path, bandwidth_hz: float) -> None:
+    done = livebode("tune", run, "--loop-checked", "--bandwidth-hz", bandwidth_hz, "--json")
     assert done.code == 2
     found = json.loads(done.out.splitlines()[0])
     assert not found["met"]
     assert found["limited_by"]
     assert "the best promises" in done.out + done.err
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "example"),
+    [
+        ("gain-margin-db", 99, "6"),
+        ("max-sensitivity", 0, "1.4 … 2"),
+        ("disk-margin", 9, "0.5 … 0.8"),
+        ("coherence", 2, "0.5"),
+    ],
+)
+def test_a_limit_out_of_range_is_answered_by_an_example(run: Path, option: str, value: float, example: str) -> None:
+    done = livebode("tune", run, f"--{option}", value)
+    assert (done.code, done.err.count("\n")) == (2, 1)
+    assert f"is out of range; choose for example {example} (option --{option})" in done.err
+
+
+def test_a_bandwidth_below_the_grid_is_answered_by_the_lines_that_it_needs(run: Path) -> None:
+    done = livebode("tune", run, "--loop-checked", "--bandwidth-hz", 1e-6)
+    assert done.code == 2
+    assert "and the lowest line is 4 Hz; add the lines" in done.err
 
 
 def proposed(run: Path, *options: object) -> Any:

@@ -95,7 +95,16 @@ def test_what_needs_a_response_is_refused_by_one_sentence(
     done = livebode(*(word.format(run=run[0], log=log) for word in command))
     assert done.code == 2
     assert done.err.count("\n") == 1
-    assert "is an output-only run: it has modes and no responses; query its table" in done.err
+    assert (
+        "is an output-only run: it has modes and no responses; read its table parameters with livebode export"
+        in done.err
+    )
+
+
+def test_the_advice_for_a_run_without_responses_works(run: tuple[Path, str], tmp_path: Path) -> None:
+    assert livebode("export", run[0], "--sql", "SELECT count(*) FROM parameters").code == 0
+    written = livebode("export", run[0], "--to", "csv", "--parameters", "--out", tmp_path / "parameters.csv")
+    assert written.code == 0, written.err
 
 
 @pytest.mark.parametrize(

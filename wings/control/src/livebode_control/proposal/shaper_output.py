@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from livebode.cli import results_directory
 from livebode.core import RecordError, write_whole, writing
@@ -13,7 +13,13 @@ if TYPE_CHECKING:
 
 
 def propose_shaper(
-    directory: Path, model: str | None, mode: str | None, tolerance: float, axis: str, *, as_json: bool
+    directory: Path,
+    model: str | None,
+    mode: str | None,
+    tolerance: float,
+    axis: Literal["x", "y", "z"],
+    *,
+    as_json: bool,
 ) -> None:
     """Write the input shapers for a mode of a run to its directory, and print them.
 
@@ -26,7 +32,7 @@ def propose_shaper(
     tolerance
         Share of the vibration that may remain.
     axis
-        Axis in the text for Klipper: x, y or z.
+        Axis in the text for Klipper.
     as_json
         Print them as JSON.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import exp
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -82,7 +82,7 @@ def tune_command(
     ] = None,
     tolerance: Annotated[float, typer.Option(help="For --shaper: share of the vibration that may remain.")] = 0.05,
     klipper_axis: Annotated[
-        str, typer.Option(metavar="x|y|z", help="For --shaper: axis in the text for Klipper.")
+        Literal["x", "y", "z"], typer.Option(help="For --shaper: axis in the text for Klipper.")
     ] = "x",
     as_json: Json = False,
 ) -> None:

@@ -37,7 +37,7 @@ def friction_command(
     rate: Rate = None,
     time: Time = None,
     places: Annotated[
-        int, typer.Option(metavar="N", help="Find the Coulomb friction at N positions along the travel. \\[default: 0]")
+        int, typer.Option(metavar="N", help="Find the Coulomb friction at N positions along the travel.")
     ] = 0,
     band: Annotated[
         float, typer.Option(metavar="HZ", help="Band of the filter; below excitation and resonances.")

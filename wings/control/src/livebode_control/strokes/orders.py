@@ -151,6 +151,7 @@ def orders_of(
             argument="turn", value=turn,
         )  # fmt: skip
     known = np.zeros(0) if lines_hz is None else np.asarray(lines_hz, dtype=np.float64)
+    _check_frequencies(known, highest_hz)
     search = _Search(motion, shafts, _angle(motion, angle) * 2 * np.pi / per_turn, known, highest_hz)
     smooth = SmoothMotion.of(motion.block, motion.input, motion.output, motion.kind, band_hz, None)
     slowest = _slowest(smooth.velocity)
@@ -163,6 +164,20 @@ def orders_of(
         curve = search.friction(search.without_ripple(search_result.shafts), band_hz, slowest)
         search_result = search.result(curve, inertia_per_s)
     return search_result
+
+
+def _check_frequencies(lines_hz: Floats, highest_hz: float) -> None:
+    """UsageError for a line of the time, or a highest frequency, that is not positive; the highest may be infinite."""
+    for line in lines_hz[~(np.isfinite(lines_hz) & (lines_hz > 0))]:
+        raise UsageError(
+            "out-of-range", f"the line {line:g} Hz is not a positive frequency", "write frequencies in Hz: 20,40,50",
+            argument="time_lines", value=float(line),
+        )  # fmt: skip
+    if not highest_hz > 0:
+        raise UsageError(
+            "out-of-range", f"{highest_hz=} is not a positive number", "choose a frequency in Hz",
+            argument="highest_hz", value=highest_hz,
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)

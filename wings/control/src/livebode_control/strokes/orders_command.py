@@ -100,7 +100,7 @@ def orders_command(
             angle=samples.angle,
             turn=section.turn,
             lines_hz=_lines(time_lines, samples),
-            highest_hz=highest or section.highest_hz or float("inf"),
+            highest_hz=highest if highest is not None else section.highest_hz or float("inf"),
             band_hz=band,
         )
 
@@ -138,7 +138,7 @@ def _shaft(text: str) -> Shaft:
     name, _, description = text.partition("=")
     turns, _, orders = description.partition(":")
     try:
-        return Shaft(name.strip(), float(turns), tuple(int(order) for order in orders.split(",")))
+        numbers = float(turns), tuple(int(order) for order in orders.split(","))
     except ValueError:
         raise UsageError(
             "unreadable",
@@ -147,6 +147,7 @@ def _shaft(text: str) -> Shaft:
             argument="shaft",
             value=text,
         ) from None
+    return Shaft(name.strip(), *numbers)
 
 
 def _lines(text: str | None, motion: MotionSamples) -> Any:

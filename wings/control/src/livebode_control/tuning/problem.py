@@ -178,8 +178,10 @@ class TuningProblem:
 
         |T| of the worst plant within a disc is at least (|L| − r)/(|1 + L| + r).
         """
-        bandwidth = self.specification.bandwidth_hz
-        assert bandwidth is not None
+        required = self.specification.bandwidth_hz
+        assert required is not None
+        # Beyond the frequencies of the grid, the points at its end stand for the bandwidth.
+        bandwidth = np.clip(required, self.plant.frequency_hz[0], self.plant.frequency_hz[-1])
         f, slopes = self.structure.response(x)
         below = (self.plant.frequency_hz <= bandwidth) & (self.plant.frequency_hz > bandwidth / 4)
         loop, slope = self.plant.value[:, below] * f[below], slopes.T[below]

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 from livebode_control.tuning.input_shaper import InputShaper
 
 KLIPPER_KINDS = ("zv", "zvd", "ei")
 
 
-def klipper_text(shaper: InputShaper, axis: str = "x") -> str:
+def klipper_text(shaper: InputShaper, axis: Literal["x", "y", "z"] = "x") -> str:
     """The section `[input_shaper]` of Klipper's configuration, for one of the kinds that it has.
 
     Its keys are those of Klipper's configuration reference (2024); it computes the impulses itself.

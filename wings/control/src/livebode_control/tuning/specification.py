@@ -63,9 +63,9 @@ class LoopSpecification:
     def __post_init__(self) -> None:
         inf = float("inf")
         self._check("bandwidth_hz", 0.0, inf, "a positive bandwidth")
-        self._check("gain_margin_db", 0.0, 60.0, "6 is usual")
-        self._check("phase_margin_deg", 0.0, 90.0, "30 … 60 is usual")
-        self._check("max_sensitivity", 1.0, inf, "1.4 … 2 is usual")
+        self._check("gain_margin_db", 0.0, 60.0, "for example 6")
+        self._check("phase_margin_deg", 0.0, 90.0, "for example 30 … 60")
+        self._check("max_sensitivity", 1.0, inf, "for example 1.4 … 2")
         self._check("noise_gain", 0.0, inf, "a positive limit")
         self._check("encoder_step", 0.0, inf, "a positive step")
         self._check("input_noise", 0.0, inf, "a positive limit")
@@ -77,9 +77,9 @@ class LoopSpecification:
                 argument="input_noise",
                 value=self.input_noise,
             )
-        self._check("confidence", 0.0, 1.0, "0.95 is usual")
-        self._check("disk_margin", -1e-300, 2.0, "0.5 … 0.8 is usual")
-        self._check("coherence", -1e-300, 1.0, "0.5 is usual")
+        self._check("confidence", 0.0, 1.0, "for example 0.95")
+        self._check("disk_margin", -1e-300, 2.0, "for example 0.5 … 0.8")
+        self._check("coherence", -1e-300, 1.0, "for example 0.5")
         self._check("notches", -1, 5, "0 … 4")
 
     @property

@@ -259,7 +259,12 @@ def validate_run_at_lines(
         if fit.status != "ok"
     ]
     if not judged:
-        raise FitError("not-fitted", "; ".join(refused), "fit another model", models=[_name(fit) for fit, _ in fits])
+        raise FitError(
+            "not-fitted",
+            "; ".join(refused),
+            "set fit.output, or fit another model",
+            models=[_name(fit) for fit, _ in fits],
+        )
     return judged, refused
 
 

@@ -105,7 +105,12 @@ def validate_run(
         if fit.status != "ok"
     ]
     if not judged:
-        raise FitError("not-fitted", "; ".join(refused), "fit another model", models=[fit.model.name for fit in fits])
+        raise FitError(
+            "not-fitted",
+            "; ".join(refused),
+            "set fit.output, or fit another model",
+            models=[fit.model.name for fit in fits],
+        )
     return judged, notes + refused
 
 

@@ -40,7 +40,9 @@ def validate_command(
     ] = None,
     model: Annotated[
         list[str] | None,
-        typer.Option(help="rigid, two-mass, … modal; repeat to compare. \\[default: the run's \\[fit]]"),
+        typer.Option(
+            help="rigid, two-mass, … modal, rational or auto; repeat to compare. \\[default: the run's \\[fit]]"
+        ),
     ] = None,
     samples: Annotated[int | None, typer.Option(min=1, help="Use only the last ones. \\[default: all]")] = None,
     output: Output = None,
@@ -93,10 +95,12 @@ def _validate_model(
 ) -> None:  # fmt: skip
     """Test the models on a recording or another run, write their picture, and print the verdicts."""
     from livebode.cli import tell_how_to_draw
-    from livebode.configuration import FitSection, recorded_configuration
+    from livebode.configuration import FitSection, check_model, recorded_configuration
     from livebode.records import RunRecord, to_json
     from livebode_control.validation.run_validation import validate_run
 
+    for name in models:
+        check_model(name)
     base = recorded_configuration(RunRecord.open(directory, entry=entry).summary).get("fit", {})
     named = [{"model": name} for name in models] or [{}]
     sections = [FitSection.model_validate(base | section) for section in named]
