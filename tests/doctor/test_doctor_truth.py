@@ -262,7 +262,7 @@ def test_a_run_is_read_and_what_is_damaged_is_named(tmp_path: Path) -> None:
     code, found = doctor(run)
     assert (code, found["run"]["verdict"]) == (2, "failed")
     assert found["run"]["message"].startswith("manifest.jsonl of ")
-    assert found["run"]["remedy"] == "track the recording again with `livebode run … --force`, or restore the file"
+    assert found["run"]["remedy"] == "track the recording again with `livebode run --force`, or restore the file"
 
 
 def test_two_configurations_at_once_are_refused() -> None:

@@ -110,7 +110,7 @@ def test_a_run_of_which_no_response_is_left_names_the_file_and_a_remedy_that_wor
     (track, whole), file = recorded, LOSSES[loss]
     run = shutil.copytree(whole, tmp_path / "run")
     lose(run, loss)
-    remedy = "track the recording again with `livebode run … --force`, or restore the file"
+    remedy = "track the recording again with `livebode run --force`, or restore the file"
     sentence = f"{file} of {str(run)!r} is damaged or missing, and no rows of responses are left; {remedy}"
     out = ("--out", tmp_path / "out")
     commands = (

@@ -398,7 +398,7 @@ class RunRecord:
         return RecordError(
             "damaged",
             f"{file} of {str(self.path)!r} is damaged or missing, and no rows of {table} are left",
-            "track the recording again with `livebode run … --force`, or restore the file",
+            "track the recording again with `livebode run --force`, or restore the file",
             path=str(self.path / file),
             table=table,
         )
