@@ -56,14 +56,18 @@ class Plugin(NamedTuple):  # dataclasses would double what `livebode --help` add
         return self.package == _OWN
 
     @property
+    def root(self) -> str:
+        """The package of Python that has it."""
+        return self.reference.partition(":")[0].partition(".")[0]
+
+    @property
     def is_present(self) -> bool:
         """Whether it was installed: livebode can be installed without a wing."""
-        root = self.reference.partition(".")[0]
-        if not self.is_own or root == _OWN:
+        if not self.is_own or self.root == _OWN:
             return True
         from importlib.util import find_spec
 
-        return find_spec(root) is not None
+        return find_spec(self.root) is not None
 
     def table(self) -> Any:
         """The table. ImportError or TypeError, in one sentence, if it cannot be loaded."""
@@ -137,7 +141,7 @@ def _parsed(text: str) -> Iterator[tuple[str, str]]:
 def wings_left_out(group: str) -> list[str]:
     """The wings of livebode with a table of this group that were not installed."""
     return [
-        plugin.reference.partition(".")[0].removeprefix(f"{_OWN}_")
+        plugin.root.removeprefix(f"{_OWN}_")
         for plugin in _declared()
         if plugin.group == group and not plugin.is_present
     ]

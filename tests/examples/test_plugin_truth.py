@@ -36,11 +36,15 @@ class Installed:
         (built,) = folder.glob("*.whl")
         subprocess.run([*pip, "--python", self.python, "install", "--no-deps", "--no-index", built], check=True)
 
-    def livebode(self, *words: object) -> str:
-        """What livebode prints there."""
+    def answer(self, *words: object) -> subprocess.CompletedProcess[str]:
+        """What livebode answers there."""
         code = "from livebode.cli import main; main()"
         command = [self.python, "-c", code, *map(str, words)]
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        return subprocess.run(command, capture_output=True, text=True, check=False)
+
+    def livebode(self, *words: object) -> str:
+        """What livebode prints there."""
+        done = self.answer(*words)
         assert (done.returncode, done.stderr) == (0, ""), done.stderr
         return done.stdout
 
@@ -76,6 +80,15 @@ def test_its_reader_reads_a_recording_and_its_command_prints_it(installed: Insta
     assert "Print rate and channels of a trace." in installed.livebode("--help")
 
 
+def test_its_command_refuses_what_is_no_trace_by_one_sentence(installed: Installed, tmp_path: Path) -> None:
+    done = installed.answer("trace", tmp_path / "absent.trace")
+    assert (done.returncode, "does not exist" in done.stderr) == (2, True)
+    (tmp_path / "axis.trace").write_text("1 2\n3 4\n")
+    done = installed.answer("trace", tmp_path / "axis.trace")
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+    assert "its first line is not TRACE1" in done.stderr
+
+
 def test_its_source_is_tracked_live_and_its_receiver_gets_the_events(installed: Installed, trace: Path) -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
         receiver.bind(("127.0.0.1", 0))
@@ -84,6 +97,8 @@ def test_its_source_is_tracked_live_and_its_receiver_gets_the_events(installed: 
         axis = trace.parent / "live.toml"
         axis.write_text(f'source.url = "trace:{trace}"\n{SMALL_AXIS}{publish}')
         installed.livebode("run", axis, "--out", trace.parent / "live")
+        (source,) = (check for check in checks(installed, axis) if check["name"] == "source")
+        assert source["verdict"] == "ok"
         event = json.loads(receiver.recv(1 << 16))
     assert event["run"] == "live"
     np.testing.assert_allclose(gain(trace.parent / "live"), 2, rtol=0.02)
@@ -92,7 +107,13 @@ def test_its_source_is_tracked_live_and_its_receiver_gets_the_events(installed: 
     assert 1 < float(done.stdout) < 2
 
 
+def checks(installed: Installed, *configuration: Path) -> list[dict[str, str]]:
+    """The checks of the doctor."""
+    found: list[dict[str, str]] = json.loads(installed.livebode("doctor", *configuration, "--json"))["checks"]
+    return found
+
+
 def test_the_doctor_lists_it_with_its_version(installed: Installed) -> None:
-    checks = {check["name"]: check for check in json.loads(installed.livebode("doctor", "--json"))["checks"]}
+    (check,) = (check for check in checks(installed) if check["name"] == "plug-ins")
     listed = "livebode-trace 1.0.0 (readers, sources, sinks, commands, analyses)"
-    assert (checks["plug-ins"]["verdict"], checks["plug-ins"]["message"]) == ("ok", listed)
+    assert (check["verdict"], check["message"]) == ("ok", listed)

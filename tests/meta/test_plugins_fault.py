@@ -16,6 +16,7 @@ from playwright.sync_api import Browser
 
 from livebode import plugins
 from livebode.dashboard import plugin_pages
+from livebode.sources.live import Address, LiveSource, SourceSettings
 from livebode_drives.formats import FORMATS
 from tests.support import recordings
 from tests.support.answers import Answer, answers
@@ -100,6 +101,13 @@ def test_a_page_without_an_addition_that_cannot_be_loaded_has_the_others(monkeyp
     assert [name in files["additions.js"].decode() for name in ("whatIf", "other")] == [True, False]
 
 
+def test_the_help_has_the_same_sentence(packages: tuple[Path, str], broken: dict[str, Answer]) -> None:
+    done = livebode(packages[0], "--help")
+    assert "Fit a model to the response of a run" in done.stdout
+    (line,) = done.stderr.splitlines()
+    assert line in broken["run"].err.splitlines()
+
+
 def test_the_version_does_not_look_for_plugins(packages: tuple[Path, str]) -> None:
     done = livebode(packages[0], "--version")
     assert (done.returncode, done.stderr) == (0, "")
@@ -125,20 +133,49 @@ def test_a_name_that_livebode_has_stays_its_own(tmp_path: Path) -> None:
     assert "'fit' in the commands of livebode-other is not used" in " ".join(doctor.out.split())
 
 
-def test_an_error_of_its_command_is_one_line_and_in_the_log(tmp_path: Path) -> None:
+def write_command(tmp_path: Path, error: str) -> None:
+    """A plug-in with the command "other", which raises an error."""
     (tmp_path / "livebode_other.py").write_text(
         "from livebode.cli import Command\nfrom livebode.core import UsageError\n"
         "TABLE = {'other': Command('x', 'livebode_other:other')}\n"
-        "def other() -> None:\n    raise UsageError('missing', 'nothing is there', 'write it')\n"
+        f"def other() -> None:\n    raise {error}\n"
     )
     metadata = tmp_path / "livebode_other-1.dist-info"
     metadata.mkdir()
     (metadata / "METADATA").write_text("Metadata-Version: 2.1\nName: livebode-other\nVersion: 1\n")
     (metadata / "entry_points.txt").write_text("[livebode.commands]\nother = livebode_other:TABLE\n")
+
+
+def test_an_error_of_its_command_is_one_line_and_in_the_log(tmp_path: Path) -> None:
+    write_command(tmp_path, "UsageError('missing', 'nothing is there', 'write it')")
     done = livebode(tmp_path, "other")
     assert (done.returncode, done.stderr) == (2, "livebode: nothing is there; write it\n")
     livebode(tmp_path, "--log-file", tmp_path / "log", "other")
     assert "ERROR livebode.livebode_other: usage.missing: nothing is there" in (tmp_path / "log").read_text("utf-8")
+
+
+class Device(LiveSource):
+    """A source that does not say whether its device is there."""
+
+    format = "device"
+
+    def _receive(self) -> bool:
+        return True
+
+
+def test_a_device_is_not_sought_in_the_network() -> None:
+    reach = Device(SourceSettings(url="stdin:"), Address("device", path="/dev/axis")).reach()
+    assert (reach.verdict, reach.remedy) == ("not applicable", "")
+    assert "/dev/axis" in reach.message
+
+
+def test_an_internal_error_of_its_command_names_it(tmp_path: Path) -> None:
+    write_command(tmp_path, "KeyError('odd')")
+    done = livebode(tmp_path, "other")
+    assert done.returncode == 1
+    assert "KeyError: 'odd'" in done.stderr
+    sentence = "livebode: internal error in the plug-in livebode-other 1; "
+    assert done.stderr.splitlines()[-1] == f"{sentence}please report it to its authors with the lines above"
 
 
 def without(wing: str, *commands: Sequence[object], others: Sequence[str] = ()) -> list[Answer]:

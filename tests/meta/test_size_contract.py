@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import asdict
+from pathlib import Path
 
 from tools.changed_tests import ROOT, changed_modules, concerned
 from tools.size import commands_and_options, import_depth, imports, limits, past_faces, sizes
@@ -27,6 +29,10 @@ def test_each_package_is_within_its_limits() -> None:
 def test_packages_are_imported_by_their_faces() -> None:
     assert len(past_faces()) <= PAST_FACES_MAX * len(imports()), past_faces()
     assert import_depth() <= DEPTH_MAX
+    example = "".join(path.read_text("utf-8") for path in (ROOT / "examples" / "plugin").rglob("*.py"))
+    imported = set(re.findall(r"^(?:from|import) (livebode(?:\.\w+)*)", example, re.M))
+    packages = {name: ROOT / "src" / Path(*name.split(".")) for name in imported}
+    assert [name for name, folder in packages.items() if not (folder / "__init__.pyi").exists()] == []
 
 
 def test_commands_options_and_the_readme_do_not_grow() -> None:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from livebode.core import LivebodeError, UsageError, not_written, plural
+from livebode.plugins import GROUPS, Plugin, plugins
 
 _OPTIONS_BY_CODE = {"output.exists": ("out", "force")}
 _UNITS = frozenset({"hz", "s", "days", "n", "m", "db", "deg", "rad"})
@@ -43,8 +44,11 @@ def failure_of(error: Exception) -> Failure:
     known = _known(error)
     if known is None:
         lines = "".join(traceback.format_exception(error))
-        message, remedy = "internal error in livebode", "please report it with the lines above"
-        return Failure(f"{lines}livebode: {message}; {remedy}", _internal(error, lines), _INTERNAL)
+        plugin = _plugin_in(error)
+        place = f"the plug-in {plugin.package} {plugin.version}" if plugin else "livebode"
+        whom = " to its authors" if plugin else ""
+        text = f"{lines}livebode: internal error in {place}; please report it{whom} with the lines above"
+        return Failure(text, _internal(error, lines, whom), _INTERNAL)
     options = [option for option in known.facts.get("options", ()) if option not in str(known)]
     named = f" ({plural('option', len(options))} {', '.join(options)})" if options else ""
     return Failure(f"livebode: {known}{named}", _written(known), exit_code_of([known]))
@@ -61,12 +65,20 @@ def _written(error: LivebodeError) -> dict[str, Any]:
     return {name: _plain(value) for name, value in error.as_dict().items()}
 
 
-def _internal(error: Exception, lines: str) -> dict[str, Any]:
+def _plugin_in(error: Exception) -> Plugin | None:
+    """The plug-in of somebody else whose code is on the way to an error; the last one if there are several."""
+    frames = reversed([frame for frame, _ in traceback.walk_tb(error.__traceback__)])
+    modules = [str(frame.f_globals.get("__name__")).partition(".")[0] for frame in frames]
+    others = {plugin.root: plugin for group in GROUPS for plugin in plugins(group) if not plugin.is_own}
+    return next((others[module] for module in modules if module in others), None)
+
+
+def _internal(error: Exception, lines: str, whom: str) -> dict[str, Any]:
     return {
         "code": "internal",
         "place": "",
         "message": f"{type(error).__name__}: {error}",
-        "remedy": "please report it with the traceback",
+        "remedy": f"please report it{whom} with the traceback",
         "facts": {"traceback": lines},
     }
 

@@ -9,6 +9,7 @@ import atexit
 import gc
 import os
 import sys
+import warnings
 
 from livebode.version import __version__
 
@@ -43,7 +44,11 @@ def _help() -> str:
     from livebode.cli.first_page import first_page  # with the commands of plug-ins
     from livebode.cli.frames import has_colours, terminal_width
 
-    return first_page(terminal_width(sys.stdout), colours=has_colours(sys.stdout))
+    with warnings.catch_warnings(record=True) as problems:
+        page = first_page(terminal_width(sys.stdout), colours=has_colours(sys.stdout))
+    for problem in problems:  # a plug-in that cannot be loaded
+        print(f"livebode: {problem.message}", file=sys.stderr)
+    return page
 
 
 def _printed(text: str) -> bool:

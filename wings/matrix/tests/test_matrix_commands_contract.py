@@ -330,3 +330,13 @@ def test_a_relative_baseline_is_found_from_other_directories(folder: Path, monke
         _, healthy, remark = overlays_of(one, Quantities.of(one))
         assert healthy is not None, remark
         assert run.summary["monitoring"]["changes"] == 1
+
+
+def test_the_page_of_an_entry_shows_its_loop_where_its_controller_is_described(folder: Path) -> None:
+    described = (folder / "before.toml").read_text() + CONTROLLERS.replace("GAIN", "0.3")
+    (folder / "described.toml").write_text(described)
+    assert livebode("run", folder / "described.toml", "--out", folder / "described").code == 0
+    for name in EVERY.split(", "):
+        quantities = Quantities.of(RunRecord.open(folder / "described", entry=name).summary)
+        shown = [not quantities.why_not(q) for q in ("plant", "open loop", "closed loop", "sensitivity")]
+        assert shown == [True] + [name in ("velocity1/u1", "velocity2/u2")] * 3

@@ -9,7 +9,7 @@ import livebode
 from livebode_trace.reader import TraceRecording
 
 
-def trace_command(file: Annotated[Path, typer.Argument(help="The trace.")]) -> None:
+def trace_command(file: Annotated[Path, typer.Argument(help="The trace.", exists=True, dir_okay=False)]) -> None:
     """Print rate and channels of a trace."""
     trace = TraceRecording(file)
     channels = ", ".join(f"{column.name} [{column.unit}]" for column in trace.columns)

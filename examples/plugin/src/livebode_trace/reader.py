@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from livebode.sources import Chunk, Column, Recording
+from livebode.sources import Chunk, Column, Recording, contained, damaged
 
 
 class TraceRecording(Recording):
@@ -17,10 +17,12 @@ class TraceRecording(Recording):
 
     def __init__(self, path: Path) -> None:
         super().__init__(path)
-        with path.open(encoding="utf-8") as file:
-            _, rate, *names = file.readline().split()
-        self.rate_hz = float(rate)
-        parts = [name.rstrip("]").partition("[") for name in names]
+        with path.open(encoding="utf-8") as file, contained(path, self.format):
+            begin, *words = file.readline().split() or [""]
+            if begin != "TRACE1" or len(words) < 2:
+                raise damaged("its first line is not TRACE1 RATE NAME[UNIT] …")
+            self.rate_hz = float(words[0])
+        parts = [name.rstrip("]").partition("[") for name in words[1:]]
         self.columns = tuple(Column(name, unit, key=number) for number, (name, _, unit) in enumerate(parts))
 
     def chunks(self, columns: Sequence[Column], rows: int) -> Iterator[Chunk]:

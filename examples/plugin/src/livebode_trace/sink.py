@@ -4,7 +4,7 @@ import json
 import socket
 from collections.abc import Sequence
 
-from livebode.configuration.publish_section import PublishSection, check_url
+from livebode.configuration import PublishSection, check_url
 from livebode.publishing import AxisValues, EventMessage
 
 

@@ -6,19 +6,26 @@ from typing import ClassVar
 import numpy as np
 
 from livebode.core import Channel
-from livebode.sources.live import Batch, LiveSource
+from livebode.sources.live import Batch, LiveSource, Reach
 from livebode_trace.reader import TraceRecording
 
 BATCH_S = 0.01
 
 
 class TraceSource(LiveSource):
-    """A source has one method: it connects, and delivers batches until it is stopped or the sender ends."""
+    """A source has one method, `_receive`; `reach` is for `livebode doctor`."""
 
     format: ClassVar[str] = "trace"
     waits: ClassVar[bool] = True
 
+    def reach(self) -> Reach:
+        """Whether the trace is there."""
+        if Path(self.address.path).exists():
+            return Reach("ok", f"{self.address} is there")
+        return Reach("failed", f"{self.address}: there is no such file", "check source.url")
+
     def _receive(self) -> bool:
+        """Connect, and deliver batches until it is stopped or the sender ends."""
         trace = TraceRecording(Path(self.address.path))
         rate_hz = trace.rate_hz or 0.0
         channels = tuple(Channel(column.name, column.unit) for column in trace.columns)

@@ -126,12 +126,16 @@ class LiveSource(ABC):
     def reach(self) -> Reach:
         """Whether the machine can be reached; at most a connection is opened, and closed again.
 
+        Of a device, which has neither host nor port, this is not known before a run, unless a source overrides it.
+
         Raises
         ------
         SourceError
             If the settings do not fit this computer.
         """
         host = self.address.host, self.address.port
+        if not self.address.host:
+            return Reach("not applicable", f"whether {self.address} sends is known when a run begins")
         return Reach.by(lambda: socket.create_connection(host, TIMEOUT_S).close(), self.address)
 
     @property

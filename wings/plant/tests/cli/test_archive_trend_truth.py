@@ -96,6 +96,11 @@ def test_a_picture_and_a_table_are_written_once(hall: Path, tmp_path: Path) -> N
         (["Keff", "--covariate", "temp"], "did you mean 'temperature'?"),
         (["--by", "axis"], "--by is for one quantity; name a QUANTITY, or omit it"),
         (["--dark"], "--dark is for one quantity"),
+        (["--out", "year.png"], "--out='year.png' is for one quantity; name a QUANTITY, or write .html"),
+        (
+            ["--out", "year.svg"],
+            "--out='year.svg' is neither an .html nor a .pdf; choose one of them, or omit the ending",
+        ),
         (["Keff", "--name", "Hall 1"], "--name is for the page of all quantities; leave out the QUANTITY, or omit it"),
         (["Keff", "--language", "de"], "--language is for the page of all quantities"),
     ],

@@ -6,11 +6,13 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from livebode.configuration import recorded_report
-from livebode.core import Document, OutputError, install_command
+from livebode.core import Document, OutputError, UsageError, install_command
 from livebode.language import in_language
 from livebode.records import read_summary
 from livebode_reports.first_page import trusted
 
+_OTHERS = {".png", ".svg", ".jpg", ".csv", ".json", ".txt", ".md", ".docx"}
+"""Endings of files that are not documents; any other, as of "press.2", belongs to the name."""
 _NO_PDF = "no PDF: Typst is not installed; run {}, or print the page from a browser"
 
 
@@ -19,6 +21,8 @@ def write_documents(document: Document, out: Path, *, force: bool) -> tuple[list
 
     Raises
     ------
+    UsageError
+        If `out` has the ending of a file that is not written.
     OutputError
         If a file exists and must not be replaced, or cannot be written.
     """
@@ -26,6 +30,9 @@ def write_documents(document: Document, out: Path, *, force: bool) -> tuple[list
     from livebode_reports.html import to_html
     from livebode_reports.svg import pictures_svg
 
+    if out.suffix.lower() in _OTHERS:
+        wrong = f"--out={str(out)!r} is neither an .html nor a .pdf"
+        raise UsageError("unreadable", wrong, "choose one of them, or omit the ending", argument="--out")
     base = out.with_suffix("") if out.suffix.lower() in (".html", ".pdf") else out
     page, paper = (base.with_name(base.name + ending) for ending in (".html", ".pdf"))
     check_free(paper, force=force)

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from livebode_plant.lake import Lake
     from livebode_plant.trending import Assessment, Ranked, Selection
 
+_OF_ONE = (".png", ".csv")
+
 
 @with_selection("by", "below", "since", "until", "covariate", "recipe")
 def trend_command(
@@ -60,11 +62,15 @@ def trend_command(
 
     _check(quantity, {"--by": chosen.by is not None, "--dark": dark}, {"--name": name, "--language": language})
     lake = Lake(lake_url(archive))
+    ending = out.suffix.lower() if out else ""
     if quantity is None:
+        if ending in _OF_ONE:
+            remedy = "name a QUANTITY, or write .html"
+            raise UsageError("conflict", f"--out={str(out)!r} is for one quantity", remedy, argument="--out")
         pages = out or Path("hall-report")
         write_hall_pages(lake, chosen.selection(), name, limit, language or "en", pages, force=force, as_json=as_json)
         return
-    if out is not None and out.suffix.lower() not in (".png", ".csv"):
+    if out is not None and ending not in _OF_ONE:
         raise UsageError(
             "unreadable", f"--out={str(out)!r} is neither a .png nor a .csv", "choose one of them", argument="--out"
         )
