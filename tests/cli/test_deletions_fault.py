@@ -165,3 +165,34 @@ def _clear(folder: Path) -> None:
         with suppress(OSError):
             os.chmod(path, stat.S_IRWXU)
     shutil.rmtree(folder, ignore_errors=True)
+
+
+def test_runs_of_several_outputs_are_not_put_into_a_run_and_replaced_only_together(tmp_path: Path) -> None:
+    columns = signals()
+    log = write_csv(tmp_path / "log.csv", columns | {"z": -columns["y"]})
+    track: list[object] = ["run", log, "--excitation", "w", "--input", "u", "--lines", "50,100,200", "--window", 100]
+    both = [*track, "--output", "y", "--output", "z"]
+    one = tmp_path / "one"
+    assert livebode(*track, "--output", "y", "--out", one).code == 0
+    before = state_of([one])
+    for force in ([], ["--force"]):
+        refused = livebode(*both, "--out", one, *force)
+        sentence = f"{str(one)!r} is the directory of a run, so the runs of y, z are not written into it"
+        assert (refused.code, sentence in refused.err) == (2, True), refused.err
+        assert state_of([one]) == before
+    assert livebode(*track, "--output", "y", "--out", one, "--force").code == 0
+
+    several = tmp_path / "several"
+    assert livebode(*both, "--out", several).code == 0
+    assert livebode(*both, "--out", several, "--force").code == 0
+    (several / "z" / "mine.txt").write_text("mine")
+    before = state_of([several])
+    refused = livebode(*both, "--out", several, "--force")
+    assert (refused.code, "files that livebode did not write: mine.txt" in refused.err) == (2, True), refused.err
+    assert state_of([several]) == before
+
+    shutil.copytree(several / "y", one / "y")
+    refused = livebode(*track, "--output", "y", "--out", one, "--force")
+    assert (refused.code, "it contains other runs: y; move them away" in refused.err) == (2, True), refused.err
+    (one / "y").rename(tmp_path / "y")
+    assert livebode(*track, "--output", "y", "--out", one, "--force").code == 0

@@ -261,6 +261,11 @@ def test_a_run_is_read_and_what_is_damaged_is_named(tmp_path: Path) -> None:
     damaged = doctor(run)[1]["run"]
     assert (damaged["verdict"], damaged["facts"]["damages"]) == ("warning", 1)
     assert doctor(tmp_path / "no-run")[1]["run"]["verdict"] == "failed"
+    (run / "manifest.jsonl").unlink()
+    code, found = doctor(run)
+    assert (code, found["run"]["verdict"]) == (2, "failed")
+    assert found["run"]["message"].startswith("manifest.jsonl of ")
+    assert found["run"]["remedy"] == "track the recording again with `livebode run … --force`, or restore the file"
 
 
 def test_two_configurations_at_once_are_refused() -> None:

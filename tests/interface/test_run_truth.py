@@ -42,7 +42,9 @@ def test_nothing_but_the_summary_is_read_at_first(run: Run, tmp_path: Path) -> N
     opened = Run(str(tmp_path))
     assert len(opened.lines) == 13
     with pytest.warns(livebode.core.DamageWarning, match=r"manifest.jsonl is damaged: the file is missing"):
-        assert len(opened.responses) == 0
+        assert sum(map(len, opened.batches())) == 0
+    with refused(RecordError, "damaged", path=str(tmp_path / "manifest.jsonl"), table="responses"):
+        _ = opened.responses
     with refused(RecordError, "not-a-run"):
         Run(tmp_path / "none")
     assert repr(opened).endswith("events unreadable (record.unreadable)>")

@@ -57,7 +57,9 @@ def test_damaged_responses_are_left_out(run: Path) -> None:
     flip(run / "responses.parquet", 100)
     record = RunRecord.open(run, matrix=True)
     with pytest.warns(DamageWarning, match=r"responses.parquet is damaged"):
-        assert len(record.matrix()) == 0
+        assert sum(map(len, record.matrix_batches())) == 0
+    with pytest.raises(RecordError, match=r"responses.parquet of .* no rows of responses are left; track .* again"):
+        record.matrix()
 
 
 def test_a_damaged_segment_costs_its_own_rows(log: Path, tmp_path: Path) -> None:

@@ -99,8 +99,8 @@ def by_query(path: Path) -> dict[str, list[str]]:
         for name in TABLES:
             try:
                 answer = query(RunRecord.open(path), f"FROM {name}", _MOST)
-            except UsageError as error:
-                if "does not exist" not in error.reason:
+            except (UsageError, RecordError) as error:
+                if error.code != "record.damaged" and "does not exist" not in error.reason:
                     raise
                 found[name] = []
                 continue

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -89,7 +88,7 @@ def export_command(
     name = beside(record.path)
     path = out or name.with_name(name.name + "-parameters" * parameters + "-lpv" * lpv + named("exports")[to].ending)
     if parameters:
-        table = export.ParameterTable(record.path, partial(record.tables, "parameters"))
+        table = export.ParameterTable(record.path, lambda: record.undamaged(record.tables("parameters"), "parameters"))
         written = export.save(path, lambda path: loaded(formats[to])(path, table), force=force)
         found = {"file": str(path), "rows": written.rows}
         print(to_json(found) if as_json else f"{path}: {written.rows} parameter values")
@@ -129,12 +128,12 @@ def responses(record: RunRecord, at: float | None, mean: bool) -> Iterator[Respo
     from livebode.core import Responses
 
     if at is not None:
-        return iter([Responses.of(export.nearest_response(record.batches(), at))])
+        return iter([Responses.of(export.nearest_response(record.undamaged(record.batches()), at))])
     if mean:
         from livebode.analysis import mean_of
 
         return iter([mean_of(record)])
-    return record.batches()
+    return record.undamaged(record.batches())
 
 
 def matrices(record: RunRecord, at: float | None, newest: bool) -> Iterator[MatrixResponses]:
@@ -146,7 +145,7 @@ def matrices(record: RunRecord, at: float | None, newest: bool) -> Iterator[Matr
             "use --mean for the newest matrix, or select one entry with --entry",
             options=["--at"],
         )
-    return iter([record.matrix().newest()]) if newest else record.matrix_batches()
+    return iter([record.matrix().newest()]) if newest else record.undamaged(record.matrix_batches())
 
 
 def _check(to: str, chosen: dict[str, bool], formats: tuple[str, ...]) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import os
 import re
 import signal
 from collections.abc import Callable, Iterator, Mapping
@@ -21,10 +22,10 @@ from livebode.cli.options import parsed_band
 from livebode.cli.pictures import draw, load_beside, tell_how_to_draw, tracked_amount
 from livebode.cli.remote import recorded_at
 from livebode.configuration import Axes, Axis, ConfigurationFile, ServeSection
-from livebode.core import ConfigError, LocationError, UsageError
+from livebode.core import ConfigError, LocationError, RecordError, UsageError
 from livebode.estimates import rule
 from livebode.locations import Location, Url, local_copy, location, original
-from livebode.records import to_json
+from livebode.records import check_removable, is_run, to_json
 from livebode.runtime import Destination, Document, Outcome, StoppedError, Subscriber, TrackerResults, run
 from livebode.sources import read_head
 
@@ -73,6 +74,8 @@ def run_targets(
     place = Path("runs") / target.stem if out is None else location(out)
     segments = live or any(axis.record is not None for axis in axes.values())
     with recorded_at(place, segments=segments) as (directory, send):
+        if alone is None:
+            _check_places(directory, axes, force=force)
         entries = {name or target.stem: axis.entries for name, axis in axes.items()} if serve else {}
         if serve and alone is not None and rule(alone.kind, "page") is None:
             raise UsageError(
@@ -99,6 +102,21 @@ def run_targets(
                         axes, directory, force, as_json, file,
                         lambda name: subscribers_of(name or target.stem), send, publisher,
                     )  # fmt: skip
+
+
+def _check_places(directory: Path, axes: Axes, *, force: bool) -> None:
+    """RecordError before anything is written if the runs of several axes cannot be put into this directory."""
+    if is_run(directory):
+        raise RecordError(
+            "exists",
+            f"{str(directory)!r} is the directory of a run, so the runs of {', '.join(axes)} are not written into it",
+            "choose another path",
+            path=str(directory),
+            argument="out",
+        )
+    for place in (directory / name for name in axes):
+        if force and os.path.lexists(place):
+            check_removable(place)
 
 
 @contextmanager

@@ -29,9 +29,10 @@ def view_command(
     """
     from livebode.cli.serving import dashboard_of, print_line, wait_for_the_end
     from livebode.configuration import ServeSection, read_serve_section
+    from livebode.records import is_run
 
     dashboard = dashboard_of(ServeSection() if axis is None else read_serve_section(axis), port)
-    if len(runs) == 1 and runs[0].is_dir() and not (runs[0] / "run.json").exists():
+    if len(runs) == 1 and runs[0].is_dir() and not is_run(runs[0]):
         dashboard.view_all(runs[0])
     else:
         for run in runs:

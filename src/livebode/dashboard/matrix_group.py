@@ -52,6 +52,10 @@ class MatrixGroup:
         """The axis of an entry."""
         return self.first_axis + self.outputs.index(output) * len(self.inputs) + self.inputs.index(input)
 
+    def entry(self, axis: int) -> tuple[str, str]:
+        """Output and input of an axis."""
+        return self.entries[axis - self.first_axis]
+
     def plain(self) -> dict[str, Any]:
         """For the page."""
         return {"name": self.name, "outputs": self.outputs, "inputs": self.inputs, "first_axis": self.first_axis}

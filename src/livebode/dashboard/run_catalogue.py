@@ -14,7 +14,7 @@ from livebode.analysis import alarms_of, fitted_rows, trend_points
 from livebode.core import LivebodeError, RunClock, ServerError
 from livebode.dashboard.run_entry import RunEntry, entry
 from livebode.language import Message, for_page
-from livebode.records import RunRecord
+from livebode.records import RunRecord, is_run
 
 SCAN_EVERY_S = 1.0
 RUNS_MAX = 10_000
@@ -38,7 +38,7 @@ def runs_in(directory: Path) -> list[str]:
             "check its permissions",
             path=str(directory),
         ) from None
-    return sorted(name for name in names if os.path.lexists(directory / name / "run.json"))[:RUNS_MAX]
+    return sorted(name for name in names if is_run(directory / name))[:RUNS_MAX]
 
 
 @dataclass

@@ -15,7 +15,7 @@ from livebode.core import LEVELS, LivebodeError, RunClock
 from livebode.dashboard.alarm import limited
 from livebode.language import for_page, recorded
 from livebode.monitoring import result_tone
-from livebode.records import RUN, Manifest, read_notes, read_summary, what_is_wrong
+from livebode.records import COPY, RUN, Manifest, read_notes, read_summary, what_is_wrong
 
 RunState = Literal["finished", "recording", "stopped", "broken"]
 _GROWS_S = 10.0
@@ -84,7 +84,7 @@ class RunEntry:
 def entry(run: Path) -> RunEntry:
     """The row of a run; never an error: a run that cannot be read is "broken"."""
     size, newest = _size(run)
-    written = newest.get(RUN, nan)
+    written = newest.get(RUN, newest.get(COPY, nan))
     try:
         summary, _ = read_summary(run)
         if wrong := what_is_wrong(summary):
@@ -116,7 +116,7 @@ def _readable(run: Path, summary: dict[str, Any], size: int, newest: dict[str, f
     return RunEntry(
         name=run.name,
         state=state,
-        written=newest.get(RUN, nan),
+        written=newest.get(RUN, newest.get(COPY, nan)),
         size_bytes=size,
         message=message,
         machine=_machine(configuration),

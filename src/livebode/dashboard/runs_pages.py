@@ -28,7 +28,7 @@ from livebode.dashboard.queries import json_object
 from livebode.dashboard.run_catalogue import RunCatalogue, details
 from livebode.dashboard.run_feed import views_of
 from livebode.language import Message, negotiated
-from livebode.records import Notes, delete, to_json, write_notes
+from livebode.records import Notes, delete, summary_path, to_json, write_notes
 
 NAME_LETTERS_MAX = 255
 VERSION_MAX = 1 << 53  # the largest whole number that JavaScript represents exactly
@@ -307,7 +307,7 @@ class RunsPages:
             await page(scope, receive, send)
 
     def _compared(self, before: Path, after: Path, code: str) -> str:
-        key = code, *((path.name, (path / "run.json").stat().st_mtime_ns) for path in (before, after))
+        key = code, *((path.name, summary_path(path).stat().st_mtime_ns) for path in (before, after))
         if key not in self._comparisons:
             self._comparisons[key] = document_function("comparison")(before, after, code)
             while len(self._comparisons) > _COMPARISONS_MAX:

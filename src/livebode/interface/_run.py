@@ -105,13 +105,19 @@ class Run:
         Raises
         ------
         RecordError
-            If it is not a matrix run.
+            If it is not a matrix run, or damage leaves no matrix.
         """
         return self._record.matrix()
 
     @cached_property
     def responses(self) -> Responses:
-        """All responses, as written, in memory: 100 bytes for each value; `batches` reads a long run in parts."""
+        """All responses, as written, in memory: 100 bytes for each value; `batches` reads a long run in parts.
+
+        Raises
+        ------
+        RecordError
+            If it is a matrix run, or damage leaves no response.
+        """
         return self._record.responses()
 
     def batches(self, from_s: float | None = None, to_s: float | None = None) -> Iterator[Responses]:
@@ -133,8 +139,9 @@ class Run:
         A table with the columns ``time_s``, ``schedule``, ``model``, ``name``, ``value``, ``sigma``, ``unit``,
         ``status`` and others: ``run.parameters["value"]`` is an array, ``run.parameters.text("name")`` its words, and
         ``polars.DataFrame(run.parameters)`` or ``pyarrow.table(run.parameters).to_pandas()`` a DataFrame.
+        RecordError if damage leaves no row.
         """
-        parts = self._record.tables("parameters")
+        parts = self._record.undamaged(self._record.tables("parameters"), "parameters")
         return Table.join([Table.empty(PARAMETERS.schema), *parts])
 
     @cached_property

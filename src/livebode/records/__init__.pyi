@@ -68,8 +68,11 @@ from livebode.records.segments.store import Store as Store
 from livebode.records.segments.verified_files import VerifiedFiles as VerifiedFiles
 from livebode.records.segments.writer import Writer as Writer
 from livebode.records.stored_precision import in_stored_precision as in_stored_precision
+from livebode.records.summary_file import COPY as COPY
 from livebode.records.summary_file import RUN as RUN
+from livebode.records.summary_file import is_run as is_run
 from livebode.records.summary_file import read_summary as read_summary
+from livebode.records.summary_file import summary_path as summary_path
 from livebode.records.summary_shape import what_is_wrong as what_is_wrong
 from livebode.records.tiers import Thinning as Thinning
 from livebode.records.tiers import thinned as thinned

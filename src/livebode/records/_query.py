@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from math import nan
 from typing import Any
 
-from livebode.core import Event, RunClock, moment, moments_by, needing
+from livebode.core import Event, RunClock, UsageError, moment, moments_by, needing
 from livebode.records.confined_sql import QueryResult, QueryTables, answer_query
 from livebode.records.grouped_events import each_event, event_rows
 from livebode.records.json_format import to_json
@@ -53,15 +55,29 @@ def query(run: RunRecord, sql: str, rows_max: int) -> QueryResult:
     UsageError
         If the query cannot be run.
     RecordError
-        If the run cannot be read.
+        If the run cannot be read, or damage leaves no row of a requested table.
     """
     damages: list[Event] = []  # found in Arrow's threads
+    absent: set[str] = set()
 
     def show(database: Any, asked: set[str]) -> None:
-        _show(run, database, asked, damages)
+        absent.update(_show(run, database, asked, damages))
 
     try:
-        return answer_query(sql, rows_max, QueryTables("run", _TABLES, show, lambda: _known(run)))
+        with _reporting(run, damages):
+            return answer_query(sql, rows_max, QueryTables("run", _TABLES, show, lambda: _known(run)))
+    except UsageError:
+        for loss in map(run.loss, sorted(absent)):
+            if loss is not None:
+                raise loss from None
+        raise
+
+
+@contextmanager
+def _reporting(run: RunRecord, damages: list[Event]) -> Iterator[None]:
+    """Report these at the end, in the thread of the caller."""
+    try:
+        yield
     finally:
         for damage in damages:
             run.report(damage)
@@ -70,15 +86,17 @@ def query(run: RunRecord, sql: str, rows_max: int) -> QueryResult:
 def _known(run: RunRecord) -> list[str]:
     segments, rows = run.parts()
     recorded = {segment.table for segment in segments} | rows.keys()
-    return ["events", "single_events", *(table for table in _TABLES if table in recorded)]
+    left = (table for table in _TABLES if table in recorded and (run.check([table]) or run.loss(table) is None))
+    return ["events", "single_events", *left]
 
 
-def _show(run: RunRecord, database: Any, asked: set[str], damages: list[Event]) -> None:
-    """Register the requested tables of the run, and its events, in the database."""
+def _show(run: RunRecord, database: Any, asked: set[str], damages: list[Event]) -> set[str]:
+    """Register the requested tables of the run, and its events, in the database; those that are absent."""
     tables = [table for table in _TABLES if table in asked]
     if asked & {"events", "single_events"}:
         run.check(tables)  # so that these have the damage of the requested tables
-    for table, parts in _parts_of(run, tables, damages).items():
+    shown = _parts_of(run, tables, damages)
+    for table, parts in shown.items():
         selected = []
         for number, part in enumerate(parts):
             database.register(f"_{table}_{number}", part.rows)
@@ -93,6 +111,7 @@ def _show(run: RunRecord, database: Any, asked: set[str], damages: list[Event]) 
     database.register("events", pa.Table.from_pylist(rows, schema=_EVENTS))
     each = [_plain(one, clock) for event in lines for one in each_event(event)]
     database.register("single_events", pa.Table.from_pylist(each, schema=_SINGLE_EVENTS))
+    return set(tables) - shown.keys()
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from datetime import UTC, datetime
@@ -12,6 +11,7 @@ from pathlib import Path
 from livebode.core import RecordError, move_directory, remove_empty, sync_directory, writing
 from livebode.records.inside import is_folder
 from livebode.records.segments.lock import Lock
+from livebode.records.summary_file import is_run
 
 DELETED = ".deleted"
 """Name of the directory of the deleted runs, beside the other runs."""
@@ -27,7 +27,7 @@ def delete(run: Path) -> Path:
     RecordError
         If a process records in it, it is not the directory of a run, or it cannot be moved.
     """
-    if not is_folder(run) or not os.path.lexists(run / "run.json"):
+    if not is_folder(run) or not is_run(run):
         raise RecordError(
             "not-a-run",
             f"{str(run)!r} is not the directory of a run",

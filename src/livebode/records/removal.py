@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import contextlib
-import os
 import re
 import stat
 from pathlib import Path
 
 from livebode.core import RecordError, remove_empty, remove_files
 from livebode.records.inside import is_folder
-from livebode.records.summary_file import read_summary
+from livebode.records.summary_file import COPY, RUN, is_run, read_summary
 
 _SHOWN = 5
 _PARTIAL = r"\.partial(-[0-9a-f]{8})?"  # of livebode.core.files
@@ -45,7 +44,7 @@ def foreign(run: Path) -> list[str]:
 
 def check_removable(path: Path) -> None:
     """RecordError if this is neither an empty directory nor that of a run without foreign files."""
-    if not is_folder(path) or (any(path.iterdir()) and not os.path.lexists(path / "run.json")):
+    if not is_folder(path) or (any(path.iterdir()) and not is_run(path)):
         raise RecordError(
             "not-a-run",
             f"{str(path)!r} is not the directory of a run, so it is not replaced",
@@ -57,9 +56,11 @@ def check_removable(path: Path) -> None:
     read_summary(path)
     if others := foreign(path):
         named = ", ".join(others[:_SHOWN]) + f" and {len(others) - _SHOWN} more" * (len(others) > _SHOWN)
+        runs = all(is_run(path / name) for name in others)
+        what = "other runs" if runs else "files that livebode did not write"
         raise RecordError(
             "foreign-files",
-            f"{str(path)!r} is not replaced, because it contains files that livebode did not write: {named}",
+            f"{str(path)!r} is not replaced, because it contains {what}: {named}",
             "move them away, or choose another path",
             path=str(path),
             files=others,
@@ -76,9 +77,10 @@ def remove(run: Path, *, itself: bool = True) -> None:
     """
     for name in _FOLDERS:
         remove_folder(run, name)
-    # Without it the rest is not a run: it is removed last, so that an interrupted removal can be repeated.
-    files = sorted((path for path in run.iterdir() if _written(path, _FILES)), key=lambda path: path.name == "run.json")
-    remove_files(run, [path.name for path in files])
+    # Without them the rest is not a run: they are removed last, so that an interrupted removal can be repeated.
+    names = {path.name for path in run.iterdir() if _written(path, _FILES)}
+    last = [name for name in (COPY, RUN) if name in names]
+    remove_files(run, [*sorted(names.difference(last)), *last])
     if itself:
         remove_empty(run)
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from math import nan
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -39,7 +39,7 @@ from livebode.records.matrix_table import COVARIANCE_SCHEMA, MatrixShape, entry_
 from livebode.records.matrix_table import SCHEMA as MATRIX_SCHEMA
 from livebode.records.response_table import RESPONSE_SCHEMA, responses_in
 from livebode.records.segments import event_lines, reading
-from livebode.records.segments.damage import KIND
+from livebode.records.segments.damage import KIND, loses_rows
 from livebode.records.segments.json_lines import EVENTS
 from livebode.records.segments.manifest import NAME as MANIFEST
 from livebode.records.segments.manifest import Segment
@@ -48,6 +48,7 @@ from livebode.records.summary_shape import what_is_wrong
 from livebode.tables import Table
 
 _logger = logging.getLogger(__name__)
+_Part = TypeVar("_Part", Responses, MatrixResponses, Table)
 _ROWS = 1 << 16  # of responses at once, times their lines: about 10 MB
 
 
@@ -214,10 +215,18 @@ class RunRecord:
         return matrix_shape(self.summary, self.lines)
 
     def matrix(self) -> MatrixResponses:
-        """All matrices of a matrix run, as written; no rows before the first. RecordError of another run."""
+        """All matrices of a matrix run, as written; no rows before the first.
+
+        Raises
+        ------
+        RecordError
+            If it is not a matrix run, or damage leaves no matrix.
+        """
         shape = self._matrix_shape
         none = matrices([Table.empty(MATRIX_SCHEMA)], [], shape)
-        return MatrixResponses.join(list(self.matrix_batches()) or [self._with_units(responses) for responses in none])
+        return MatrixResponses.join(
+            list(self.undamaged(self.matrix_batches())) or [self._with_units(responses) for responses in none]
+        )
 
     def matrix_batches(
         self, size_bytes_max: int | None = None, span_s: tuple[float, float] | None = None
@@ -265,9 +274,15 @@ class RunRecord:
         return bool(self.summary.get("record", {}).get("finished", True))
 
     def responses(self) -> Responses:
-        """All responses, as written; an empty batch before the first. RecordError of a matrix run."""
+        """All responses, as written; an empty batch before the first.
+
+        Raises
+        ------
+        RecordError
+            If it is a matrix run, or damage leaves no response.
+        """
         return Responses.join(
-            list(self.batches()) or [responses_in(Table.empty(RESPONSE_SCHEMA), self.lines, self.found)]
+            list(self.undamaged(self.batches())) or [responses_in(Table.empty(RESPONSE_SCHEMA), self.lines, self.found)]
         )
 
     def batches(self, size_bytes_max: int | None = None) -> Iterator[Responses]:
@@ -277,9 +292,9 @@ class RunRecord:
     def steady_batches(self) -> Iterator[Responses]:
         """Those of a machine that was ready, without a transient at the start of a live run.
 
-        Averaged responses are all included.
+        Averaged responses are all included. RecordError while iterating if damage leaves no response.
         """
-        return (steady(part, self.summary) for part in self.batches())
+        return (steady(part, self.summary) for part in self.undamaged(self.batches()))
 
     def between(self, from_s: float, to_s: float) -> Iterator[Responses]:
         """Responses with an effective time in this span, including its ends, in parts; other segments are not read."""
@@ -357,6 +372,36 @@ class RunRecord:
             raise
         except (OSError, ValueError, KeyError, TypeError) as error:
             raise _unreadable(file, error) from None
+
+    def undamaged(self, parts: Iterator[_Part], table: str = "responses") -> Iterator[_Part]:
+        """These parts of a table.
+
+        Raises
+        ------
+        RecordError
+            After the last one, if there was none because a file of the table is damaged or missing.
+        """
+        empty = True
+        for part in parts:
+            empty = False
+            yield part
+        if empty and (error := self.loss(table)) is not None:
+            raise error
+
+    def loss(self, table: str) -> RecordError | None:
+        """The error for a table of which no row is left, after it was read; None if no damage explains that."""
+        if table == "responses" and self.summary.get("counts", {}).get("responses") == 0:
+            return None
+        file = next((damage.details["file"] for damage in self.damages if loses_rows(damage, table)), None)
+        if file is None:
+            return None
+        return RecordError(
+            "damaged",
+            f"{file} of {str(self.path)!r} is damaged or missing, and no rows of {table} are left",
+            "track the recording again with `livebode run … --force`, or restore the file",
+            path=str(self.path / file),
+            table=table,
+        )
 
     @property
     def _manifest_bytes(self) -> int | None:

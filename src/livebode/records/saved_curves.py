@@ -16,7 +16,7 @@ import numpy as np
 from livebode.core import Lines, Quantity, RecordError, Responses, write_whole, writing
 from livebode.records.inside import read_bytes
 from livebode.records.json_format import check_version, format_of
-from livebode.records.summary_file import from_document, to_document
+from livebode.records.summary_file import from_document, is_run, to_document
 
 SAVED = "references.json"
 REFERENCES_MAX, ANNOTATIONS_MAX = 32, 200
@@ -131,7 +131,7 @@ def change_saved(run: Path, change: Callable[[SavedCurves], SavedCurves]) -> Sav
         from its end on.
     """
     path = str(run / SAVED)
-    if not (run / "run.json").is_file():
+    if not is_run(run):
         raise RecordError(
             "no-directory",
             f"{path!r} cannot be written yet: the run has no directory",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import zlib
 from pathlib import Path
@@ -65,6 +66,8 @@ def from_document(data: bytes) -> dict[str, Any]:
 def read_summary(run: Path) -> tuple[dict[str, Any], str]:
     """Content of run.json, or of its copy if it is damaged; then also a message on this.
 
+    The copy is also read if run.json is missing.
+
     Raises
     ------
     RecordError
@@ -73,7 +76,10 @@ def read_summary(run: Path) -> tuple[dict[str, Any], str]:
     try:
         return _read(run, RUN), ""
     except (FileNotFoundError, NotADirectoryError):
-        raise _not_a_run(run) from None
+        if not is_run(run):
+            raise _not_a_run(run) from None
+        path = str(run / RUN)
+        first = RecordError("damaged", f"{path!r} is missing", "restore it from a backup", path=path)
     except RecordError as error:
         first = error
     except OSError as error:
@@ -90,6 +96,16 @@ def read_summary(run: Path) -> tuple[dict[str, Any], str]:
         return _read(run, COPY), f"{first.message}; its copy {COPY} is read instead"
     except (OSError, RecordError):
         raise first from None
+
+
+def is_run(directory: Path) -> bool:
+    """Whether a directory has run.json, or its copy: what else is in it may then belong to a run."""
+    return os.path.lexists(summary_path(directory))
+
+
+def summary_path(run: Path) -> Path:
+    """run.json of a run, or its copy where that is missing."""
+    return run / (COPY if not os.path.lexists(run / RUN) and os.path.lexists(run / COPY) else RUN)
 
 
 def copy_damage(run: Path) -> str:

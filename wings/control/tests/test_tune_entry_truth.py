@@ -11,9 +11,12 @@ import numpy as np
 import pytest
 import scipy.signal
 from numpy.typing import NDArray
+from playwright.sync_api import Browser
 
+from livebode.dashboard import Dashboard, ServerSettings
 from livebode.interface import write_examples
 from livebode.simulation import GantryLoop
+from tests.support.browser import Tab
 from tests.support.command import livebode
 
 RATE_HZ = 4000.0
@@ -48,6 +51,20 @@ def test_one_controller_is_tuned_and_keeps_its_promise_in_the_true_loop(run: Pat
         limit = np.inf if promised[margin] is None else promised[margin]
         assert true[margin] >= limit, margin
     assert true["bandwidth_hz"] >= promised["bandwidth_hz"] > 2 * found["before"]["bandwidth_hz"]
+
+
+@pytest.mark.parametrize("axis", [0, 3])
+def test_what_if_shows_the_loop_check_of_the_controller_of_an_entry(browser: Browser, run: Path, axis: int) -> None:
+    """The check compared the descriptions of both controllers; the page shows the entry of one of them."""
+    dashboard = Dashboard(ServerSettings("127.0.0.1", 0))
+    dashboard.view(run)
+    with dashboard, Tab(browser, dashboard.url, wait=False) as tab:
+        tab.page.locator(f'[data-axis="{axis}"]').click()
+        tab.until(f"bode.curves.measured?.frame?.axis === {axis}")
+        tab.page.locator("#what-if").click()
+        tab.until("whatIf.facts")
+        assert tab.page.locator("#what-if-check").inner_text() == "loop check: as described"
+        assert tab.wrong == []
 
 
 def _transfer(gain: float, integral_time_s: float, biquads: list[dict[str, Any]]) -> control.TransferFunction:

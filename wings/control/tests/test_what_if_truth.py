@@ -27,7 +27,7 @@ from livebode_control.tuning.plant_band import PlantBand
 from livebode_control.tuning.predicted import predicted
 from livebode_control.tuning.predicted_steps import predicted_steps
 from tests.support.browser import Tab
-from tests.support.dashboards import LINES, LOOP, RATE_HZ, Watched
+from tests.support.dashboards import LINES, LOOP, RATE_HZ, Watched, whole_run
 
 F = LINES.frequency_hz
 TRIAL = {"gain": 0.35, "integral_time_s": 0.11, "position_gain": 4.0}
@@ -350,3 +350,14 @@ def test_a_phase_beyond_a_turn_gets_that_of_the_factor(tab: Tab) -> None:
         ],
     )
     assert np.allclose(list(found.values()) if isinstance(found, dict) else found, deg + added, atol=1e-6)
+
+
+def test_without_a_described_loop_nothing_is_offered_to_copy_or_to_reset(browser: Browser, tmp_path: Path) -> None:
+    directory = whole_run(tmp_path / "run", loop=None)
+    dashboard = Dashboard(ServerSettings("127.0.0.1", 0))
+    dashboard.view(directory)
+    with dashboard, Tab(browser, dashboard.url) as tab:
+        tab.page.locator("#what-if").click()
+        tab.page.locator("#what-if-check", has_text="describe its controllers under [loop]").wait_for()
+        assert tab.page.locator("#what-if-card header button:visible").all_inner_texts() == ["×"]
+        assert tab.wrong == []

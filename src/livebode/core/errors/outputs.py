@@ -31,7 +31,7 @@ class RecordError(LivebodeError):
         "entry-unknown": "The matrix of the run has no such entry.",
         "exists": "The directory of the run exists already.",
         "finished": "The run is finished and cannot be continued.",
-        "foreign-files": "The directory has files that livebode did not write, so it is neither used nor replaced.",
+        "foreign-files": "The directory has files that livebode did not write, or other runs, and is not replaced.",
         "locked": "Another process records in this directory.",
         "matrix-unsupported": "The run is a matrix run, where one with a single response is needed.",
         "newer-version": "A file of the run was written by a newer version of livebode.",

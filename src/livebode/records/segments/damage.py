@@ -11,6 +11,7 @@ from livebode.language import Message
 
 KIND = "record-damaged"
 _SHOWN = 3
+_WITHOUT_ROWS = (None, "run.json", "run-copy.json", "events.jsonl")
 
 
 Moment = tuple[int, float]
@@ -110,3 +111,15 @@ def total(places: Iterable[Damage]) -> dict[str, Any]:
         for table, number in place.rows.items():
             rows[table] = rows.get(table, 0) + number
     return {"samples": samples, "seconds": seconds, "rows": rows}
+
+
+def loses_rows(damage: Event, table: str) -> bool:
+    """Whether rows of a table may be lost by this damage; where it is not counted, of any table."""
+    details = damage.details
+    if details.get("file") in _WITHOUT_ROWS:
+        return False
+    if rows := details.get("rows"):
+        return table in rows
+    if (places := details.get("places")) is not None:
+        return any(place["begin"] is None or place["end"] is None for place in places)
+    return details.get("journals") != []  # no journal's line of the manifest is lost if each has an intact copy

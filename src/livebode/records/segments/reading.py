@@ -283,4 +283,4 @@ def _tell_of(manifest: Manifest, whole_bytes: int | None, report: Report) -> Non
         what = Message("the segments of journals {journals} are not read", journals=lost)
     numbers = ", ".join(map(str, manifest.broken)) or Message("the last")
     message = Message("{file} is damaged in line {numbers}; {what}", file=NAME, numbers=numbers, what=what)
-    report(Event(KIND, 0, 0.0, message, {"lines": manifest.broken}))
+    report(Event(KIND, 0, 0.0, message, {"lines": manifest.broken, "journals": manifest.missing}))

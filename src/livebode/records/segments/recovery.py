@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,7 +11,7 @@ from livebode.records.segments import journal, manifest
 from livebode.records.segments.journal import Commit, Journal
 from livebode.records.segments.manifest import Manifest
 from livebode.records.segments.shelf import sweep
-from livebode.records.summary_file import RUN, read_summary
+from livebode.records.summary_file import RUN, is_run, read_summary
 
 EVENTS = "events.jsonl"
 
@@ -44,7 +43,7 @@ def recover(run: Path) -> UnfinishedRun | None:
     OSError
         If it cannot be read.
     """
-    if not os.path.lexists(run / RUN):
+    if not is_run(run):
         _clear(run)
         return None
     if not (run / manifest.NAME).exists() or read_summary(run)[0].get("record", {}).get("finished", True):

@@ -29,8 +29,8 @@ AXES, BATCHES = 2, 20
 @pytest.fixture
 def log(tmp_path: Path) -> Iterator[LogServer]:
     with LogServer(tmp_path, PARTITIONS) as log:
-        # As `livebode fleet run` does: nats-server 2.9.10 ends with a nil pointer where a worker asks for a message of a
-        # stream that somebody is just creating.
+        # As `livebode fleet run` does: nats-server 2.9.10 ends with a nil pointer where a worker asks for a message of
+        # a stream that somebody is just creating.
         sent(log_section(log.url), {}, 0)
         yield log
 

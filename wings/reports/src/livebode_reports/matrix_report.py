@@ -63,7 +63,7 @@ def read_matrix(directory: Path, header: ReportSection | None = None) -> MatrixR
     run = RunRecord.open(directory, matrix=True)
     newest: MatrixResponses | None = None
     count, incomplete, begin_s, end_s = 0, 0, inf, -inf
-    for part in run.matrix_batches():
+    for part in run.undamaged(run.matrix_batches()):
         valid = part.valid.any(axis=(1, 2))
         count += len(part)
         incomplete += int(np.count_nonzero(~part.valid.all(axis=(1, 2))))

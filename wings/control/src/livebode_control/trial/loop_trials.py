@@ -55,14 +55,14 @@ def _tables(values: Mapping[str, Any], controller: Model) -> Mapping[str, Any]:
 _READ_BYTES = 16 << 20  # a longer run is averaged from its overview, every n-th response
 
 
-def loop_trial(
-    past: Past, quantities: Quantities, summary: dict[str, Any], plant: Callable[[], PlantBand]
-) -> dict[str, Any]:
+def loop_trial(run: ShownRun, plant: Callable[[], PlantBand]) -> dict[str, Any]:
     """For the page, as plain data; `why_not` if nothing can be tried, `band_why_not` if the bounds are unknown."""
+    past, quantities = run.past, run.quantities
     feedback = quantities.feedback
     if feedback is None and quantities.own != "open loop":
         return {"why_not": for_page(quantities.why_not("open loop"))}
-    checked = checked_loop(past.directory, recorded_loop(summary))
+    entry = None if run.group is None else run.group.entry(run.axis)
+    checked = checked_loop(past.directory, recorded_loop(run.summary), entry)
     model = feedback or Gain(1.0)  # without a description the measured L is the plant, and F is a factor
     drawn_hz, rate_hz = grid_hz(quantities.lines), quantities.lines.rate_hz
     parts = FeedbackParts.of(model, drawn_hz)
@@ -160,7 +160,7 @@ class LoopTrials:
 
     def facts(self, run: ShownRun, _asked: Mapping[str, str]) -> dict[str, Any]:
         """What the page needs to try other gains and filters, read again; `why_not` if nothing can be tried."""
-        return loop_trial(run.past, run.quantities, run.summary, lambda: self._read(run))
+        return loop_trial(run, lambda: self._read(run))
 
     def steps(self, run: ShownRun, asked: Mapping[str, str]) -> dict[str, Any]:
         """Steps and torque noise before and after, of the plant that the page has; `trial` is the text of the page."""

@@ -144,12 +144,13 @@ def _validate_model(
 def _reason(section: FitSection, on: Path, at_lines: bool, entry: str | None) -> str:
     """Why a model is judged at the lines from the beginning; empty for one that is simulated."""
     from livebode.fitting import POLE_MODELS
+    from livebode.records import is_run
 
     if entry is not None:
         return "the other inputs of a matrix move the output too"
     if at_lines:
         return "--at-lines asks for it"
-    if (on / "run.json").exists():
+    if is_run(on):
         return f"{on.name} is a run, not a recording"
     return f"a {section.model} model is not simulated" if section.model in POLE_MODELS else ""
 
@@ -177,10 +178,11 @@ def _at_lines(
     """On another run; a recording is tracked as the run was, in a directory that is removed."""
     from tempfile import TemporaryDirectory
 
+    from livebode.records import is_run
     from livebode.runtime import Destination, run
     from livebode_control.validation.line_validation import validate_run_at_lines
 
-    if (on / "run.json").exists():
+    if is_run(on):
         return validate_run_at_lines(directory, on, sections, drifting, entry)
     with TemporaryDirectory() as there:
         other = Path(there) / on.stem

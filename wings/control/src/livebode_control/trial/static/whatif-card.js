@@ -164,6 +164,8 @@ export class WhatIfCard {
     remember("what-if", on ? textOf(trial) : "", "");
     curve.factor = on && facts ? (one) => factor(facts, trial, one) : null;
     this.button.classList.toggle("changed", on);
+    // Without a loop there is no value to copy, and nothing to return to.
+    for (const id of ["what-if-toml", "what-if-biquads", "what-if-reset"]) $(id).hidden = !facts;
     page.dirty.add("bode").add("additions");
   }
 
