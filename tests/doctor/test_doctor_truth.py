@@ -219,6 +219,8 @@ def test_each_of_several_axes_is_asked_for_its_source(tmp_path: Path) -> None:
         ("[source\n", "TOML"),
         ('[source]\nurl = "udp://127.0.0.1:5000"\nrate_hz = 1000\n' + ONE_LINE_DIRECT.replace('"100"', '"101"'), "101"),
         ('[source]\nlog = "a"\n' + ONE_LINE_DIRECT + '[monitoring]\nbaseline = "none.json"\n', "none.json"),
+        ('inputs = ["*.csv"]\nrecipe = "none.toml"\nlake = "lake"\n', "there is no file"),
+        ('[signals]\noutput = "y"\n', "'source' is missing, so this is not a file that doctor checks"),
         ("[excitation]\nband_hz = [1, 2]\nwhat = 3\n[belt.mechanics]\n", "excitation.what"),
     ],
 )
@@ -238,9 +240,10 @@ def test_an_invalid_configuration_fails_with_its_sentence(tmp_path: Path, text: 
     [
         ("examples/experiment.toml", "an experiment"),
         ("src/livebode/interface/example_files/several-motors.toml", "an experiment of several motors"),
+        ("wings/plant/src/livebode_plant/example_files/archive.toml", "an archive"),
     ],
 )
-def test_an_experiment_is_a_configuration_too(file: str, title: str) -> None:
+def test_an_experiment_and_an_archive_are_configurations_too(file: str, title: str) -> None:
     code, checks = doctor(ROOT / file)
     assert checks["configuration"]["message"].endswith(f"is valid: {title}")
     assert checks["configuration"]["verdict"] == "ok"

@@ -18,7 +18,7 @@ class FileKind(NamedTuple):
     title
         What the file describes, as "an experiment".
     tables
-        Tables of which a file of this kind has at least one, and axis.toml none; empty where only its command
+        Tables or keys of which a file of this kind has at least one, and axis.toml none; empty where only its command
         recognises the file.
     model
         "module:name" of the pydantic model of a file that is recognised. `read(path)` of it reads the file, and

@@ -16,7 +16,7 @@ from livebode.configuration import (
     read_bytes,
     recorded_configuration,
 )
-from livebode.core import LivebodeError, UsageError
+from livebode.core import ConfigError, LivebodeError, UsageError
 from livebode.estimates import rule
 from livebode.plugins import loaded
 from livebode.preparation import live_follower
@@ -96,12 +96,24 @@ def _read(configuration: Path | None, run_path: Path | None) -> Subject:
             kind = kind_of_file(table)
             if kind is not None:
                 loaded(kind.model).read(configuration).check()
+            elif table.keys().isdisjoint(("source", "axes")):
+                raise _without_source(configuration)
             else:
                 axes = axes_of(data, configuration, {})
                 _check_axes(axes, configuration)
         except LivebodeError as error:
             problems["configuration"] = error
     return Subject(configuration, table, kind, axes, run, run_path, problems)
+
+
+def _without_source(path: Path) -> ConfigError:
+    """The error of a recipe of an archive, of a template of reports, or of an unfinished axis.toml."""
+    return ConfigError(
+        "key-missing",
+        "'source' is missing, so this is not a file that doctor checks",
+        "add [source]; a recipe is checked with its archive.toml, and a template when a report uses it",
+        key="source",
+    ).at(str(path))
 
 
 def _check_axes(axes: Mapping[str, Axis], path: Path) -> None:

@@ -22,8 +22,9 @@ from livebode.core import (
     whole_directory,
     writing,
 )
-from livebode.plugins import loaded, named
+from livebode.plugins import loaded
 from livebode.records import to_json
+from livebode_design.file_kinds import FILES
 from livebode_design.files import FORMATS
 
 _MARK, _AXIS, _SCHEMA = "design.json", "axis.toml", "axis.schema.json"
@@ -162,7 +163,8 @@ def _without_scipy() -> dict[str, str]:
 def described(experiment: str | PathLike[str] | Mapping[str, Any], over: Mapping[str, Any]) -> DescribedExperiment[Any]:
     """The experiment in a TOML file, or in the same as a mapping; `over` replaces keys of its [excitation]."""
     table = experiment if isinstance(experiment, Mapping) else read_table(Path(experiment))
-    model: Any = loaded((kind_of_file(table) or named("files")["experiment"]).model)
+    kind = kind_of_file(table)
+    model: Any = loaded((kind if kind in FILES.values() else FILES["experiment"]).model)
     specification: DescribedExperiment[Any]
     if not isinstance(experiment, Mapping):
         specification = model.read(Path(experiment), over)

@@ -40,14 +40,14 @@ class SettingsFile(SettingsSection):
         """The settings in plain data; `origin` names it in messages."""
         try:
             settings = cls.model_validate(data)
-            settings.check()
+            settings.check_values()
         except ValidationError as error:
             raise _first_error(error, cls).at(origin) from None
         except ConfigError as error:
             raise error.at(origin) from None
         return settings
 
-    def check(self) -> None:
+    def check_values(self) -> None:
         """ConfigError if values are valid each by itself, and not together."""
 
 

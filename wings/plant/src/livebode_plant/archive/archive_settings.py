@@ -173,13 +173,17 @@ class ArchiveSettings(SettingsFile):
     baselines: Text | None = None
     cluster: ClusterSection = ClusterSection()
 
-    def check(self) -> None:
+    def check_values(self) -> None:
         """ConfigError if the cluster would be open to others, or a template is invalid."""
         self.cluster.checked()
         for template in self.templates:
             template.checked()
         if self.baselines is not None:
             check_baselines(self.baselines, "baselines")
+
+    def check(self) -> None:
+        """ConfigError if the recipe is invalid."""
+        self.axes()
 
     def beside(self, folder: Path) -> Self:
         """The settings with their paths relative to a folder."""

@@ -239,7 +239,7 @@ class FleetSettings(SettingsFile):
     leaf: LeafSection | None = None
     users: UsersSection = UsersSection()
 
-    def check(self) -> None:
+    def check_values(self) -> None:
         """ConfigError if the address of the log is not usable."""
         self.log.checked()
 
