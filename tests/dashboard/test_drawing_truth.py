@@ -114,7 +114,7 @@ def test_the_newest_response_with_its_bands(browser: Browser, watched: Watched, 
                 curves[name] = same_turn(curves[name], truth)
             assert np.allclose(curves[name], truth, **CLOSE), name
         unit = "1 rad/s/(N m)" if quantity == "plant" else ""
-        assert unit in tab.js("bode.charts[0].axes[1].label")
+        assert unit in tab.js("bode.charts[0].axes[1].label(bode.charts[0])")
         assert tab.wrong == []
 
 

@@ -12,10 +12,12 @@ import pytest
 from playwright.sync_api import Browser, Page
 
 from livebode.dashboard import Dashboard, ServerSettings
+from livebode.interface import write_examples
 from livebode.language import in_language
 from livebode.records import read_notes
 from livebode_reports.compare_report import Comparison
 from tests.support.browser import Tab
+from tests.support.command import livebode
 from tests.support.languages import pseudo, untranslated
 from tests.support.many_runs import BEGUN, SOFTER, source_run, weeks
 from tools.run_copies import copy_run
@@ -109,6 +111,33 @@ def test_the_comparison_is_the_report_of_livebode_compare_without_a_refused_part
         weight = "getComputedStyle(document.querySelector('.verdict .tone')).fontWeight"
         assert tab.page.evaluate(weight) == "700"  # its style is applied
         assert tab.wrong == []
+
+
+def test_what_cannot_be_opened_is_a_page_with_the_sentence(browser: Browser, tmp_path: Path) -> None:
+    """Output-only runs, unknown ones, and comparisons that are not possible; the list has no estimator of the first."""
+    write_examples(["output-only"], tmp_path)
+    assert livebode("run", tmp_path / "ambient.toml", "--out", tmp_path / "runs" / "ambient").code == 0
+    dashboard = Dashboard(ServerSettings("127.0.0.1", 0))
+    dashboard.view_all(tmp_path / "runs")
+    with dashboard, Tab(browser, dashboard.url, wait=False) as tab:
+        page = tab.page
+        page.locator("[data-key='open-ambient']").wait_for()
+        assert "joint" not in page.locator("[data-run='ambient']").inner_text()
+        for address, said in (
+            ("run/ambient/", "output"),
+            ("run/%3Ci%3E/", "there is no run '<i>'"),
+            ("compare?before=ambient&after=ambient&language=de", ";"),
+        ):
+            answer = page.goto(dashboard.url + address)
+            assert answer is not None
+            assert (answer.status, answer.headers["content-type"]) == (400, "text/html; charset=utf-8")
+            sentence = page.locator("[role=alert]").inner_text()
+            assert said in sentence, sentence
+            assert "{" not in sentence
+        assert page.locator("html").get_attribute("lang") == "de"
+        page.locator("a.back").click()
+        page.locator("[data-run='ambient']").wait_for()
+        assert [text for text in tab.wrong if "400" not in text] == []
 
 
 def test_the_trends_show_the_known_change_and_lead_to_the_run(browser: Browser, url: str) -> None:

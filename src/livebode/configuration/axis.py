@@ -289,13 +289,12 @@ def _names(section: type[BaseModel]) -> list[str]:
 
 
 def _section_at(loc: tuple[int | str, ...]) -> type[BaseModel]:
-    section: Any = Axis
+    section: type[BaseModel] = Axis
     for part in (part for part in loc if isinstance(part, str)):
-        annotation = section.model_fields[part].annotation
+        annotation: Any = section.model_fields[part].annotation
         section = next(
             c
             for c in (annotation, *getattr(annotation, "__args__", ()))
             if isinstance(c, type) and issubclass(c, BaseModel)
         )
-    assert issubclass(section, BaseModel)
     return section

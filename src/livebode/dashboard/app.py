@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import tempfile
 from collections.abc import Callable
 from functools import partial
@@ -11,7 +12,7 @@ from typing import Any, get_args
 from starlette.applications import Starlette
 from starlette.background import BackgroundTask
 from starlette.requests import Request
-from starlette.responses import FileResponse, JSONResponse, RedirectResponse, Response
+from starlette.responses import FileResponse, HTMLResponse, JSONResponse, RedirectResponse, Response
 from starlette.routing import BaseRoute, Route, WebSocketRoute
 from starlette.websockets import WebSocket
 
@@ -31,7 +32,7 @@ from livebode.dashboard.runs_pages import RunsPages
 from livebode.dashboard.server_settings import ServerSettings
 from livebode.dashboard.signals import signals
 from livebode.dashboard.state import State
-from livebode.language import Message, catalogue_for_page, negotiated
+from livebode.language import Message, catalogue_for_page, in_language, negotiated, tr, worded
 from livebode.plugins import loaded
 from livebode.records import SavedCurves, change_saved, read_saved
 
@@ -87,15 +88,15 @@ def application(
         routes += RunsPages(
             directory,
             board,
-            lambda board: _app(_page_routes(_Pages(board, serving, pages.files))),
+            lambda board: _app(_page_routes(_Pages(board, serving, pages.files)), serving.language),
             pages.file,
             serving.language,
         ).routes
-    return Guard(_app(routes), serving.names, serving.tls is not None)
+    return Guard(_app(routes, serving.language), serving.names, serving.tls is not None)
 
 
-def _app(routes: list[BaseRoute]) -> Starlette:
-    return Starlette(routes=routes, exception_handlers={LivebodeError: _sorry})
+def _app(routes: list[BaseRoute], language: str | None) -> Starlette:
+    return Starlette(routes=routes, exception_handlers={LivebodeError: partial(_sorry, language)})
 
 
 def _page_routes(pages: _Pages) -> list[BaseRoute]:
@@ -325,8 +326,42 @@ def _unknown() -> Response:
     return JSONResponse(error_answer(Message("log in first")), 401)
 
 
-async def _sorry(_request: Request, error: Exception) -> Response:
+async def _sorry(language: str | None, request: Request, error: Exception) -> Response:
+    """The error for a script, or as a page for a person who opened an address."""
     pause_s = error.facts.get("retry_after_s") if isinstance(error, LivebodeError) else None
-    if pause_s is None:
-        return JSONResponse(error_answer(error), 400)
-    return JSONResponse(error_answer(error), 429, headers={"retry-after": str(pause_s)})
+    status, headers = (400, {}) if pause_s is None else (429, {"retry-after": str(pause_s)})
+    accepted = request.headers
+    if request.method != "GET" or "text/html" not in accepted.get("accept", ""):
+        return JSONResponse(error_answer(error), status, headers)
+    code = negotiated(request.query_params.get("language", ""), language, accepted.get("accept-language", ""))
+    with in_language(code):
+        sentence, back = worded(getattr(error, "words", str(error))), tr("All runs")
+    of_runs = request.url.path.startswith(("/run/", "/compare"))
+    text = _ERROR_PAGE.format(
+        code=code, sentence=html.escape(sentence), back=f'<p><a class="back" href="/">{back}</a></p>' if of_runs else ""
+    )
+    return HTMLResponse(text, status, headers)
+
+
+_ERROR_PAGE = """<!doctype html>
+<html lang="{code}">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<meta name="color-scheme" content="light dark">
+<title>livebode</title>
+<link rel="icon" href="/static/icon.svg" type="image/svg+xml">
+<link rel="stylesheet" href="/static/look.css">
+<link rel="stylesheet" href="/static/layout.css">
+<link rel="stylesheet" href="/static/panels.css">
+<script type="module" src="/static/error.js"></script>
+</head>
+<body>
+<main class="card login">
+  <h1 class="brand"><span aria-hidden="true" class="mark"></span>livebode</h1>
+  <p class="wrong" role="alert">{sentence}</p>
+  {back}
+</main>
+</body>
+</html>
+"""

@@ -127,7 +127,9 @@ def _readable(run: Path, summary: dict[str, Any], size: int, newest: dict[str, f
         lines=len(frequencies),
         low_hz=min(frequencies, default=None),
         high_hz=max(frequencies, default=None),
-        estimator="".join(_texts(configuration.get("tracking") or {}, ("estimator",))),
+        estimator=""
+        if "output_only" in summary
+        else "".join(_texts(configuration.get("tracking") or {}, ("estimator",))),
         tone=tone,
         alarms=alarms,
         model=str(summary.get("fit", {}).get("model", ""))[:80],

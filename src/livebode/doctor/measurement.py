@@ -98,7 +98,10 @@ def check_run(subject: Subject) -> Check:
     if run is None:
         return Check.of_error(RUN, subject.problems[RUN])
     try:
-        responses = sum(map(len, run.undamaged(run.matrix_batches() if run.is_matrix else run.batches())))
+        if run.is_matrix:
+            responses = sum(map(len, run.undamaged(run.matrix_batches())))
+        else:
+            responses = sum(map(len, run.undamaged(run.batches())))
         events = sum(1 for _ in run.each_event())
     except LivebodeError as error:
         return Check.of_error(RUN, error)

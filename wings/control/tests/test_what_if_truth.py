@@ -361,3 +361,30 @@ def test_without_a_described_loop_nothing_is_offered_to_copy_or_to_reset(browser
         tab.page.locator("#what-if-check", has_text="describe its controllers under [loop]").wait_for()
         assert tab.page.locator("#what-if-card header button:visible").all_inner_texts() == ["×"]
         assert tab.wrong == []
+
+
+def test_the_titles_of_low_charts_on_a_telephone_are_whole(browser: Browser, run: Path) -> None:
+    """Of the magnitude without its unit, which has no room above the sliders."""
+    dashboard = Dashboard(ServerSettings("127.0.0.1", 0))
+    dashboard.view(run)
+    telephone = {"width": 390, "height": 844}
+    with dashboard, Tab(browser, dashboard.url + "#sliders=1", viewport=telephone) as tab:
+        tab.until("whatIf.facts && !page.dirty.has('bode') && bode.charts[0].height < 200")
+        titles = tab.page.evaluate(_UPRIGHT_TITLES)
+        assert [title for title, _, _ in titles] == ["|G| in dB", "phase in °"]
+        assert all(0 <= top < bottom <= 1 for _, top, bottom in titles), titles
+        assert tab.wrong == []
+
+
+_UPRIGHT_TITLES = """async () => {
+  const found = [], before = CanvasRenderingContext2D.prototype.fillText;
+  CanvasRenderingContext2D.prototype.fillText = function (text, ...at) {
+    const { b, f } = this.getTransform(), half = this.measureText(text).width / 2, { height } = this.canvas;
+    if (b) found.push([text, (f - half) / height, (f + half) / height]);
+    before.call(this, text, ...at);
+  };
+  for (const chart of livebode.bode.charts.slice(0, 2)) chart.redraw();
+  await new Promise(requestAnimationFrame);  // it draws behind the task that asks for it
+  CanvasRenderingContext2D.prototype.fillText = before;
+  return found;
+}"""

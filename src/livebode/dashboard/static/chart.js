@@ -43,6 +43,19 @@ export function axis(label, more = {}) {
 }
 
 /**
+ * The label of an upright axis: the first of these texts that is not longer than the chart is high, else the last one.
+ *
+ * @param {string[]} texts
+ * @returns {(u: uPlot) => string}
+ */
+export const fitting = (texts) => (u) => {
+  const { ctx, bbox } = u,
+    middle = bbox.top + bbox.height / 2, // of the axis, where the label is
+    room = 2 * Math.min(middle, ctx.canvas.height - middle);
+  return texts.find((text) => ctx.measureText(text).width <= room) ?? texts[texts.length - 1];
+};
+
+/**
  * Round frequencies on a logarithmic axis: the lines themselves if they are few, otherwise 1, 2, 5 of every decade.
  *
  * @param {() => number[]} lines

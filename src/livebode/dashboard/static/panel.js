@@ -1,7 +1,7 @@
 // @ts-check
 // One chart of the Bode plot: its axes, the series of each curve, and what is drawn above and below them.
 import { PANELS } from "./bode.js";
-import { axis, chart, letters } from "./chart.js";
+import { axis, chart, fitting, letters } from "./chart.js";
 import { gestures } from "./gestures.js";
 import { tr } from "./language.js";
 import { ink, look } from "./looks.js";
@@ -16,15 +16,16 @@ import { scaled, shifted } from "./zoom.js";
 
 const COHERENCE = /** @type {Range} */ ([-0.1, 1.25]); // room for the cursor's ring around 0 and 1
 
-/** @param {Bode} bode */
-function magnitudeLabel({ symbol, units, view, operation }) {
-  // On a wall there is no room for the unit beside letters that are read from afar.
-  const unit = operation?.kind === "ratio" || letters() > 1 ? "" : (units[view.power + 2] ?? "");
+/** With its unit, and without it for a chart that is too low. @param {Bode} bode */
+function magnitudeLabels({ symbol, units, view, operation }) {
+  const unit = operation?.kind === "ratio" ? "" : (units[view.power + 2] ?? "");
   const of = operation ? (operation.kind === "ratio" ? "A/B" : "A − B") : symbol;
   const power = view.power && operation?.kind !== "ratio" ? `(jω)${superscript(view.power)} ` : "";
   const shown = `${power}${of}`;
-  if (view.absolute) return unit ? tr("|{symbol}| in {unit}", { symbol: shown, unit }) : `|${shown}|`;
-  return unit ? tr("|{symbol}| in dB re 1 {unit}", { symbol: shown, unit }) : tr("|{symbol}| in dB", { symbol: shown });
+  const brief = view.absolute ? `|${shown}|` : tr("|{symbol}| in dB", { symbol: shown });
+  if (!unit) return [brief];
+  const values = { symbol: shown, unit };
+  return [view.absolute ? tr("|{symbol}| in {unit}", values) : tr("|{symbol}| in dB re 1 {unit}", values), brief];
 }
 
 /** @param {number} power */
@@ -92,7 +93,7 @@ export function panel(bode, index) {
       bands.push({ series: [first + 1, first + 2], fill: () => `${ink(name)}${own ? "38" : "24"}` });
   }
   const y = [
-    { scale: { range: () => bode.limits(0) }, axis: () => magnitudeAxis(magnitudeLabel(bode), bode.view) },
+    { scale: { range: () => bode.limits(0) }, axis: () => magnitudeAxis(fitting(magnitudeLabels(bode)), bode.view) },
     { scale: { range: () => bode.limits(1) }, axis: () => phaseAxis(tr("phase in °"), bode.view) },
     {
       scale: { range: () => bode.zooming.heights[2] ?? COHERENCE },

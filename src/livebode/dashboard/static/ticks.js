@@ -51,7 +51,7 @@ export function frequencyAxis(lines, view, last) {
 }
 
 /**
- * @param {string} label
+ * @param {uPlot.Axis.Label} label
  * @param {View} view
  */
 export function magnitudeAxis(label, view) {

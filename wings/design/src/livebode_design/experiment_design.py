@@ -164,7 +164,8 @@ def described(experiment: str | PathLike[str] | Mapping[str, Any], over: Mapping
     """The experiment in a TOML file, or in the same as a mapping; `over` replaces keys of its [excitation]."""
     table = experiment if isinstance(experiment, Mapping) else read_table(Path(experiment))
     kind = kind_of_file(table)
-    model: Any = loaded((kind if kind in FILES.values() else FILES["experiment"]).model)
+    own = kind if kind is not None and kind in FILES.values() else FILES["experiment"]
+    model: Any = loaded(own.model)
     specification: DescribedExperiment[Any]
     if not isinstance(experiment, Mapping):
         specification = model.read(Path(experiment), over)
