@@ -113,6 +113,19 @@ def test_the_comparison_is_the_report_of_livebode_compare_without_a_refused_part
         assert tab.wrong == []
 
 
+def test_the_name_of_a_recording_is_not_broken_on_a_desk(browser: Browser, url: str) -> None:
+    with Tab(browser, url, wait=False, viewport={"width": 1400, "height": 900}) as tab:
+        cell = tab.page.locator("[data-run='day 5'] [data-column='machine']")
+        cell.wait_for()
+        rows = """(cell) => {
+          cell.firstChild.data = "gantry-1-today.parquet";
+          const range = document.createRange();
+          range.selectNodeContents(cell.firstChild);
+          return range.getClientRects().length;
+        }"""
+        assert cell.evaluate(rows) == 1
+
+
 def test_what_cannot_be_opened_is_a_page_with_the_sentence(browser: Browser, tmp_path: Path) -> None:
     """Output-only runs, unknown ones, and comparisons that are not possible; the list has no estimator of the first."""
     write_examples(["output-only"], tmp_path)

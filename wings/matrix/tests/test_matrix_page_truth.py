@@ -147,6 +147,21 @@ def test_axe_finds_nothing_and_nothing_is_wider_than_a_telephone(browser: Browse
         assert tab.js("document.documentElement.scrollWidth <= innerWidth")
 
 
+def test_the_header_of_an_entry_has_one_row_on_a_desk(browser: Browser, gantry: Path) -> None:
+    dashboard = Dashboard(ServerSettings("127.0.0.1", 0))
+    dashboard.view(gantry)
+    with dashboard, Tab(browser, dashboard.url, viewport={"width": 1400, "height": 900}) as tab:
+        tab.until("matrix.answer && document.querySelector('[data-axis]')")
+        tab.page.locator('[data-axis="3"]').click()
+        tab.until("bode.curves.measured?.frame?.axis === 3")
+        assert tab.page.locator("#axis option:checked").inner_text().endswith("velocity2/u2")
+        assert "velocity2" not in tab.page.locator("#status-text").inner_text(), "it is there once"
+        first, last = (tab.page.locator(one).bounding_box() for one in ("#axis", "#help"))
+        assert first is not None
+        assert last is not None
+        assert last["y"] < first["y"] + first["height"]
+
+
 def test_a_live_matrix_run_shows_each_entry(browser: Browser, gantry: Path) -> None:
     record = RunRecord.open(gantry, matrix=True)
     rows = record.matrix()

@@ -386,7 +386,8 @@ function status() {
   document.body.classList.toggle("not-begun", !facts.begun);
   const [word, look] = lamp(known, timeline.span, timeline.atS !== null);
   $("lamp").className = `lamp ${look}`;
-  $("status-text").textContent = `${facts.name} · ${word}`;
+  // The long name of an entry is in the choice beside it: twice there, the header would need a second row.
+  $("status-text").textContent = facts.begun && facts.matrix ? word : `${facts.name} · ${word}`;
   lost.show(known, timeline.span.live && timeline.atS === null);
   firstLook(page);
   wall.draw();
