@@ -364,6 +364,7 @@ NOT_HERE = {
     "--mean for the newest matrix": "in tests/cli/test_matrix_commands_contract.py",
     "livebode validate RUN --entry": "in tests/cli/test_matrix_commands_contract.py",
     "`livebode run`": "a record that names no channels, which no command writes",
+    "`livebode run --force`": "a damaged run: tests/records/test_file_damage_fault.py",
     "export, by SQL": "an output-only run: wings/modes/tests/test_command_truth.py",
     "--help": "every command has it: tests/meta/test_command_line.py",
     "by {}": "the command line is composed; `run --output-only` is executed above",

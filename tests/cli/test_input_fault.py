@@ -48,11 +48,11 @@ def log(tmp_path: Path) -> Path:
         ((*JOINT, "--lines", "fifty", "--window", 100), ("'fifty'", "20:140:20")),
         ((*JOINT, "--lines", "50,50", "--window", 100), ("bin 5 (50 Hz)", "duplicated")),
         ((*JOINT, "--lines", "50", "--window", 5000), ("2000 samples", "window of 5000")),
-        ((*JOINT, "--lines", "50", "--window", 10**12), ("2000 samples", f"window of {10**12}")),
+        ((*JOINT, "--lines", "50", "--window", 10**12), (f"lines.window = {10**12}", "less than or equal to 16777216")),
         ((*JOINT, "--lines", "10,30", "--window", 100), ("no power at 10 Hz or any other",)),
         (("--excitation", "t", "--input", "u", "--output", "y"), ("straight line",)),
         ((*JOINT, "--lines", "50", "--window", "long"), ("'long'", "auto")),
-        ((*JOINT, "--lines", "50", "--window", 2), ("window=2",)),
+        ((*JOINT, "--lines", "50", "--window", 2), ("lines.window = 2", "greater than or equal to 3")),
         (
             (*JOINT, "--lines", "50,100,200,300", "--window", 100),
             ("'w' has no power at 300 Hz", "to 'auto'"),
