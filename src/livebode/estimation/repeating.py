@@ -192,7 +192,9 @@ class RepeatingErrors(PeriodCutter):
                 before_stop = True if span.stop is None else sample - self._window + 1 < span.stop
                 of_spans[:, span.line] |= (sample >= span.first) & before_stop
             return of_spans
-        hum: Flags | None = np.tile(self._silent_hum > 0, (sample.size, 1)) if self._silent_hum.any() else None
+        hum: Flags | None = (
+            np.tile(self._silent_hum > 0, (sample.size, 1)) if np.count_nonzero(self._silent_hum) else None
+        )
         for stretch in self._search.process(data, data[self._reference], block.start, aside):
             self._process_silence(stretch, block.origin_s + (stretch.stop - 1) / block.rate_hz)
             hum = np.zeros((sample.size, self._silent_hum.size), dtype=np.bool_) if hum is None else hum

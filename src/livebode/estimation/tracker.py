@@ -21,6 +21,7 @@ from livebode.estimation.tracker_settings import Settings
 
 NOTHING: Integers = np.zeros((0, 2), dtype=np.int64)
 """No stretch is set aside."""
+_NO_POSITIONS = np.zeros(0, dtype=np.intp)
 
 
 def contains(spans: Integers, first: Integers, last: Integers) -> NDArray[np.bool_]:
@@ -43,7 +44,7 @@ def contains(spans: Integers, first: Integers, last: Integers) -> NDArray[np.boo
 def positions(spans: Integers, start: int, stop: int) -> NDArray[np.intp]:
     """Positions of their samples among the samples start … stop − 1."""
     if not len(spans):  # of nearly every block, which a search would make 7 % dearer
-        return np.zeros(0, dtype=np.intp)
+        return _NO_POSITIONS
     every = np.arange(start, stop)
     return np.flatnonzero(contains(spans, every, every))
 
