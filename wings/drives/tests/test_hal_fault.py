@@ -11,7 +11,7 @@ import pytest
 
 from livebode.core import ConfigError, SourceError
 from livebode.sources.live import SourceSettings, make_source, open_source
-from livebode_drives.live.hal import SampleText, consecutive
+from livebode_drives.live.hal import SampleText, begun_by_two, consecutive
 from livebode_drives.live.hal_wiring import SAMPLER_KEY, fifo, halcmd
 from tests.support.command import livebode
 from tests.support.errors import refused
@@ -94,6 +94,16 @@ def test_a_computer_without_linuxcnc_is_told_what_to_install(monkeypatch: pytest
     monkeypatch.setenv("PATH", str(tmp_path))
     with refused(SourceError, "refused", program="halcmd"):
         halcmd("show", "pin")
+
+
+@pytest.mark.parametrize("cut", [1, 2, 3])
+def test_a_signal_that_does_not_count_is_refused_however_its_samples_come(cut: int) -> None:
+    constant = np.zeros((2, 5))
+    tables = [constant[:, first : first + cut] for first in range(0, 5, cut)]
+    first, *others = begun_by_two(iter(tables))
+    assert np.array_equal(np.concatenate([first, *others], axis=1), constant)
+    with refused(SourceError, "value-invalid", key="source.sample_signal"):
+        consecutive(first, 0)
 
 
 @pytest.mark.parametrize("cut", [1, 3, 7, 1000])

@@ -131,7 +131,7 @@ class HalSource(LiveSource):
             try:
                 self._established()
                 self._announce(wiring.channels, wiring.rate_hz)
-                for values in self._tables(sampler, SampleText(wiring.pins, stale)):
+                for values in begun_by_two(self._tables(sampler, SampleText(wiring.pins, stale))):
                     for first, data in self._spans(values, wiring.count):
                         taken = data[list(wiring.rows)]
                         self._deliver(Batch(first, taken, wiring.channels, wiring.rate_hz, wiring.epoch))
@@ -198,6 +198,23 @@ class HalSource(LiveSource):
         except SourceError as error:
             self._malformed(error)
             return []
+
+
+def begun_by_two(tables: Iterator[NDArray[np.float64]]) -> Iterator[NDArray[np.float64]]:
+    """The tables, the first joined with those behind it until it has two samples: one does not show that it counts.
+
+    >>> one, three = np.zeros((4, 1)), np.zeros((4, 3))
+    >>> [table.shape for table in begun_by_two(iter([one, three, one]))]
+    [(4, 4), (4, 1)]
+    """
+    begun: list[NDArray[np.float64]] = []
+    for table in tables:
+        begun.append(table)
+        if sum(part.shape[1] for part in begun) > 1:
+            break
+    if begun:
+        yield np.concatenate(begun, axis=1)
+    yield from tables
 
 
 class SampleText:
