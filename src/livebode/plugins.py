@@ -74,8 +74,7 @@ class Plugin(NamedTuple):  # dataclasses would double what `livebode --help` add
         try:
             table = loaded(self.reference)
         except Exception as error:  # whatever the module of somebody else does
-            reason = " ".join(str(error).split()) or "no reason given"
-            raise ImportError(self._problem(f"cannot be loaded ({type(error).__name__}: {reason})")) from error
+            raise ImportError(self._problem(not_loaded(error))) from error
         if not isinstance(table, GROUPS[self.group]):
             expected = GROUPS[self.group].__name__.lower()
             raise TypeError(self._problem(f"is of type {type(table).__name__}, not a {expected}"))
@@ -172,6 +171,16 @@ def named(group: str) -> Mapping[str, Any]:
     for table in tables(group):
         parts = parts | {name: part for name, part in table.items() if name not in parts}
     return parts
+
+
+def not_loaded(error: Exception) -> str:
+    """What to say of a reference that raised this error, whatever the module of somebody else does.
+
+    >>> not_loaded(OSError("no licence"))
+    'cannot be loaded (OSError: no licence)'
+    """
+    reason = " ".join(str(error).split()) or "no reason given"
+    return f"cannot be loaded ({type(error).__name__}: {reason})"
 
 
 def loaded(reference: str) -> Any:

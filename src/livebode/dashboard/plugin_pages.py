@@ -7,7 +7,7 @@ from collections.abc import Awaitable, Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
-from livebode.plugins import PluginWarning, loaded, named
+from livebode.plugins import PluginWarning, loaded, named, not_loaded
 
 if TYPE_CHECKING:
     from starlette.requests import Request
@@ -102,9 +102,8 @@ def page_additions() -> dict[str, type[PageAddition]]:
         try:
             additions[name] = loaded(reference)
         except Exception as error:  # whatever the module of somebody else does: the page is needed without it, too
-            reason = f"{type(error).__name__}: {' '.join(str(error).split())}"
-            remedy = "update its plug-in, or remove it"
-            warnings.warn(f"{name!r} is not on the page: {reference} ({reason}); {remedy}", PluginWarning, stacklevel=2)
+            why = f"{reference} {not_loaded(error)}; update its plug-in, or remove it"
+            warnings.warn(f"{name!r} is not on the page: {why}", PluginWarning, stacklevel=2)
     return additions
 
 
