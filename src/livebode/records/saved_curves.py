@@ -127,8 +127,8 @@ def change_saved(run: Path, change: Callable[[SavedCurves], SavedCurves]) -> Sav
     Raises
     ------
     RecordError
-        If the file is damaged, or the directory cannot be written or does not exist yet: a run in one piece has one
-        from its end on.
+        If the file is damaged, or the directory cannot be written or does not exist yet: a recording has one from the
+        end of its run on.
     """
     path = str(run / SAVED)
     if not is_run(run):

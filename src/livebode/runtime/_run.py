@@ -36,7 +36,7 @@ def run(axis: Axis, to: Destination, control: RunControl | None = None) -> Outco
     control, started = control or RunControl(), time.perf_counter()
     kind = axis.kind
     named, logs = open_recordings(axis)
-    if not logs:
+    if not logs:  # the source is live
         from livebode.runtime.live import run_live
 
         return run_live(axis, to, control)

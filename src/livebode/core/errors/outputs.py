@@ -35,7 +35,7 @@ class RecordError(LivebodeError):
         "locked": "Another process records in this directory.",
         "matrix-unsupported": "The run is a matrix run, where one with a single response is needed.",
         "newer-version": "A file of the run was written by a newer version of livebode.",
-        "no-directory": "The run has no directory yet: it is written in one piece, at its end.",
+        "no-directory": "The run has no directory yet: that of a recording appears at its end.",
         "no-matrix": "The run has one response, and no matrix of them.",
         "no-parameters": "The run has no fitted parameters.",
         "no-responses": "The run has no responses.",
