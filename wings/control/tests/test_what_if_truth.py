@@ -268,7 +268,7 @@ def test_an_unchecked_loop_is_shown_and_nothing_is_written(tab: Tab, run: Path) 
 
 def test_sliders_follow_keys_and_fields_and_the_address_keeps_them(tab: Tab) -> None:
     page = tab.page
-    tab.until("!page.dirty.has('trial')")  # the margins follow a slider at the next frame only
+    tab.until("!page.dirty.has('additions')")  # the margins follow a slider at the next frame only
     before = tab.js("whatIf.margins.after.measured.bandwidthHz")
     bar = page.locator('#what-if-rows [type=range][data-part="gain"]')
     field = page.locator('#what-if-rows [type=number][data-part="gain"]')
