@@ -50,6 +50,9 @@ from livebode.core.controllers import DriveTiming as DriveTiming
 from livebode.core.controllers import PositionPD as PositionPD
 from livebode.core.controllers import integral as integral
 from livebode.core.deferred_model import DeferredModel as DeferredModel
+from livebode.core.distributions import CIRCLE_FACTOR as CIRCLE_FACTOR
+from livebode.core.distributions import COVERAGE as COVERAGE
+from livebode.core.distributions import INTERVAL_FACTOR as INTERVAL_FACTOR
 from livebode.core.distributions import f_exceeded as f_exceeded
 from livebode.core.distributions import f_quantile as f_quantile
 from livebode.core.distributions import log_sum_exceeded as log_sum_exceeded

@@ -13,6 +13,7 @@ from livebode.preparation.checks import ChannelCheck as ChannelCheck
 from livebode.preparation.checks import check_excitation as check_excitation
 from livebode.preparation.checks import check_length as check_length
 from livebode.preparation.checks import check_some_valid as check_some_valid
+from livebode.preparation.configuring import Settled as Settled
 from livebode.preparation.configuring import settled as settled
 from livebode.preparation.configuring import suitable_estimator as suitable_estimator
 from livebode.preparation.contents import ChannelSummary as ChannelSummary
@@ -29,6 +30,7 @@ from livebode.preparation.part import motion_part as motion_part
 from livebode.preparation.plan import beginnings as beginnings
 from livebode.preparation.plan import roles_in_doubt as roles_in_doubt
 from livebode.preparation.plan import window_in_doubt as window_in_doubt
+from livebode.preparation.proposal import Guess as Guess
 from livebode.preparation.proposal import Proposals as Proposals
 from livebode.preparation.quiet import Quiet as Quiet
 from livebode.preparation.quiet import silences as silences
