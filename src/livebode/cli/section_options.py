@@ -44,7 +44,7 @@ def key_help(key: str) -> str:
     """Help of an option that sets a key, such as "source.rate_hz".
 
     >>> key_help("tracking.forgetting")
-    'Weight of a period relative to the next one; 1 forgets nothing. \\\\[default: 0.8; x>0; x<=1]'
+    'Weight of a period relative to the next one; 1 forgets nothing. \\\\[default: 0.8; 1 for the average of a recording; x>0; x<=1]'
     """
     section, _, name = key.partition(".")
     return _keys(section)[name].help
