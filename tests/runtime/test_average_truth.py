@@ -9,7 +9,6 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 from scipy.linalg import expm
-from scipy.signal import lfilter
 from scipy.stats import binom
 
 import livebode

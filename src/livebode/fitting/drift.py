@@ -56,8 +56,8 @@ class DriftTest(StatefulBase):
     Windows that do not overlap are averaged in up to 32 groups of equal length. At each line a parabola over time is
     fitted to the groups, for the change as its straight part, and for the largest distance from the mean. Without
     drift, the power of the straight part over that of the residuals is F(2, 2d), with d the number of groups less
-    three, so that its probability is (1 + F/d)^-d. A record is significant if one line has less than half of `FALSE_ALARM`
-    after Bonferroni, or all lines together have by Fisher's method.
+    three, so that its probability is (1 + F/d)^-d. A record is significant if one line has less than half of
+    `FALSE_ALARM` after Bonferroni, or all lines together have by Fisher's method.
 
     Responses that average over periods are turned back into the windows that they gained. Of averages Gᵢ with the mean
     times tᵢ of their windows, a window that has its centre at c and the share s of the average's weight gives
