@@ -64,9 +64,9 @@ def draw_titled(estimate: SingleResponse, into: Path, *, title: str, names: tupl
         return
     from livebode.pictures import save_pictures  # with Matplotlib half a second to import
 
-    schedule, fitted = estimate.schedule_label, estimate.fit
+    schedule, fitted, mean = estimate.schedule_label, estimate.fit, estimate.average
     with _ONE_AT_A_TIME:
-        save_pictures(responses, into, title=title, schedule_name=schedule, names=names, fitted=fitted)
+        save_pictures(responses, into, title=title, schedule_name=schedule, names=names, fitted=fitted, mean=mean)
 
 
 def load_beside() -> None:
@@ -92,6 +92,7 @@ def show(outcome: Outcome) -> None:
             height=max(16, min(size.lines - 4, 36)),
             colour=is_terminal() and "NO_COLOR" not in os.environ,
             unicode="utf" in (sys.stdout.encoding or "").lower(),
+            mean=outcome.average,
         )
     )
     print(f"{tracked_amount(outcome.summary)}\n{original(str(outcome.directory))}/")

@@ -38,7 +38,7 @@ def about_record(of: RunData) -> list[Finding]:
 
 def _record(of: RunData) -> list[Finding]:
     findings = []
-    if not of.run.finished:
+    if not of.run.ended:
         findings.append(
             Finding(
                 "check",
