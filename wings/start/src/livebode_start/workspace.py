@@ -1,0 +1,108 @@
+"""The files of a directory of runs, and harmless names for those that come from a browser."""
+
+from __future__ import annotations
+
+import os
+import re
+import unicodedata
+from itertools import count
+from pathlib import Path, PurePosixPath, PureWindowsPath
+from typing import Any
+
+from livebode.core import ServerError
+from livebode.language import Message
+from livebode.plugins import tables
+
+NAME_BYTES_MAX = 100
+"""Of a name without its ending: run directory, configuration and outbox are named after it."""
+_ENDING_LETTERS_MAX = 12
+_FILES_MAX = 1000
+_FORBIDDEN = re.compile(r'[<>:"/\\|?*]')
+_DEVICE = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)
+_OWN = (".toml", ".json", ".jsonl", ".sqlite")  # a run.json would make the directory a run
+
+
+def harmless_name(text: str) -> str:
+    """A name of a file that is valid on every system and in no other directory, from one that somebody else chose.
+
+    >>> harmless_name("../../etc/passwd"), harmless_name("C:\\\\logs\\\\axis 3.csv"), harmless_name("con.csv")
+    ('passwd', 'axis 3.csv', '_con.csv')
+    >>> harmless_name("run.json"), harmless_name("..")
+    ('run.json.txt', 'recording')
+    """
+    text = PureWindowsPath(PurePosixPath(text.replace("\0", "")).name).name
+    text = unicodedata.normalize("NFC", text.encode(errors="ignore").decode())
+    text = "".join(letter for letter in text if unicodedata.category(letter)[0] != "C")
+    text = _FORBIDDEN.sub("_", text).strip(". ")
+    stem, dot, ending = text.rpartition(".")
+    if not dot or len(ending) > _ENDING_LETTERS_MAX:
+        stem, ending = text, ""
+    stem = stem.encode()[:NAME_BYTES_MAX].decode(errors="ignore").strip(". ") or "recording"
+    name = f"{stem}.{ending}" if ending else stem
+    if _DEVICE.fullmatch(name):
+        name = f"_{name}"
+    return f"{name}.txt" if name.lower().endswith(_OWN) else name
+
+
+class Workspace:
+    """A directory with recordings, their configurations and runs.
+
+    A name from outside is looked for among the names in it, and never becomes a path by itself.
+
+    Parameters
+    ----------
+    directory
+        It may be missing.
+    """
+
+    def __init__(self, directory: Path) -> None:
+        self.directory = directory.absolute()
+
+    def create(self) -> None:
+        """Create the directory if it is missing; OSError if the system refuses it."""
+        self.directory.mkdir(parents=True, exist_ok=True)
+
+    def files(self) -> dict[str, os.stat_result]:
+        """The plain files by name, without links and hidden ones."""
+        try:
+            with os.scandir(self.directory) as entries:
+                plain = [e for e in entries if not e.name.startswith(".") and e.is_file(follow_symlinks=False)]
+                return {entry.name: entry.stat(follow_symlinks=False) for entry in plain}
+        except OSError:  # it is missing, or may not be read: there is nothing to choose from
+            return {}
+
+    def recordings(self) -> list[dict[str, Any]]:
+        """Name, bytes and seconds since 1970 of each file with the ending of a recording, the newest first."""
+        endings = tuple({ending for table in tables("readers") for format_ in table for ending in format_.suffixes})
+        rows = [
+            {"name": name, "size_bytes": status.st_size, "written": status.st_mtime}
+            for name, status in self.files().items()
+            if name.lower().endswith(endings)
+        ]
+        return sorted(rows, key=lambda row: row["written"], reverse=True)[:_FILES_MAX]
+
+    def path(self, name: object) -> Path:
+        """The file of this name; ServerError if there is none."""
+        if not isinstance(name, str) or name not in self.files():
+            shown = name[:NAME_BYTES_MAX] if isinstance(name, str) else ""
+            raise ServerError(
+                "file-unknown", f"there is no recording {shown!r}", Message("reload the page"), name=shown
+            )
+        return self.directory / name
+
+    def free_name(self, name: str) -> str:
+        """This name, or with a number: one that no file has."""
+        stem, dot, ending = name.rpartition(".")
+        stem, ending = (stem, dot + ending) if dot else (name, "")
+        return next(n for n in _numbered(stem) if not os.path.lexists(self.directory / f"{n}{ending}")) + ending
+
+    def free_stem(self, stem: str) -> str:
+        """This name, or with a number: one that neither a configuration nor a run has."""
+        taken = (lambda n: os.path.lexists(self.directory / n) or os.path.lexists(self.directory / f"{n}.toml"))
+        return next(n for n in _numbered(stem) if not taken(n))
+
+
+def _numbered(stem: str) -> Any:
+    yield stem
+    for number in count(2):
+        yield f"{stem}-{number}"
