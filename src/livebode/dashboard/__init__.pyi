@@ -22,6 +22,7 @@ from livebode.dashboard.plugin_pages import Order as Order
 from livebode.dashboard.plugin_pages import PageAddition as PageAddition
 from livebode.dashboard.plugin_pages import PluginPages as PluginPages
 from livebode.dashboard.plugin_pages import ShownRun as ShownRun
+from livebode.dashboard.plugin_pages import WorkspacePages as WorkspacePages
 from livebode.dashboard.quantities import Quantities as Quantities
 from livebode.dashboard.queries import json_object as json_object
 from livebode.dashboard.queries import moment as moment

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import html
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any, get_args
@@ -26,7 +26,14 @@ from livebode.dashboard.browser_socket import Client, serve_browser
 from livebode.dashboard.frames import frame
 from livebode.dashboard.guard import Guard, body
 from livebode.dashboard.past import Past
-from livebode.dashboard.plugin_pages import Answer, PluginPages, ShownRun, files_of_additions, page_additions
+from livebode.dashboard.plugin_pages import (
+    Answer,
+    PluginPages,
+    ShownRun,
+    WorkspacePages,
+    files_of_additions,
+    page_additions,
+)
 from livebode.dashboard.queries import SavedChange
 from livebode.dashboard.runs_pages import RunsPages
 from livebode.dashboard.server_settings import ServerSettings
@@ -69,10 +76,18 @@ _TYPES = {"csv": "text/csv; charset=utf-8", "mat": "application/octet-stream"}
 
 
 def application(
-    board: Board, serving: ServerSettings, directory: Path | None = None, others: PluginPages | None = None
+    board: Board,
+    serving: ServerSettings,
+    directory: Path | None = None,
+    others: PluginPages | None = None,
+    workspaces: Mapping[str, WorkspacePages] | None = None,
 ) -> Guard:
-    """The ASGI application: the page of the board, of a plug-in, or of all runs of a directory, each with a board."""
-    pages = _Pages(board, serving, _files(others))
+    """The ASGI application: the page of the board, of a plug-in, or of all runs of a directory, each with a board.
+
+    `workspaces` are the pages of plug-ins beside the list of runs, by name.
+    """
+    workspaces = workspaces or {}
+    pages = _Pages(board, serving, _files(others, workspaces))
     routes: list[BaseRoute] = [
         Route("/login", pages.login_page, methods=["GET"]),
         Route("/login", pages.login, methods=["POST"]),
@@ -92,6 +107,7 @@ def application(
             pages.file,
             serving.language,
         ).routes
+        routes += [route for beside in workspaces.values() for route in beside.routes(board, pages.file, pages.order)]
     return Guard(_app(routes, serving.language), serving.names, serving.tls is not None)
 
 
@@ -294,13 +310,13 @@ class _Pages:
         return state
 
 
-def _files(others: PluginPages | None) -> dict[str, tuple[bytes, str]]:
+def _files(others: PluginPages | None, workspaces: Mapping[str, WorkspacePages]) -> dict[str, tuple[bytes, str]]:
     """Content and type of the static files, in memory: reading a file would take a thread for each request."""
     folders = [(_HERE / "static", ""), (_HERE / "_vendor" / "uplot", "uplot/")]
     if others is not None:
         folders.append((others.static, ""))
     files = {prefix + path.name: path.read_bytes() for folder, prefix in folders for path in folder.iterdir()}
-    files |= files_of_additions()
+    files |= files_of_additions(workspaces)
     return {name: (content, kind) for name, content in files.items() if (kind := _FILE_TYPES.get(Path(name).suffix))}
 
 
