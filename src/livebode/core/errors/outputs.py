@@ -147,6 +147,10 @@ class ServerError(LivebodeError):
         "cannot-listen": "The operating system does not let the dashboard listen at this address.",
         "entry-only": "This is one entry of a matrix run, with which nothing can be saved.",
         "event-unknown": "An event with this key does not exist.",
+        "file-unknown": "A file of this name is not among those that the page offers.",
+        "job-not-started": "The operating system did not start the process of a job.",
+        "job-unknown": "A job of this name was not started since the server started.",
+        "name-invalid": "The text cannot be the name of a file.",
         "no-alarm": "The event is not an alarm, so it cannot be shelved.",
         "not-begun": "The run has no samples or responses yet.",
         "not-started": "The dashboard did not start in time.",
@@ -156,9 +160,10 @@ class ServerError(LivebodeError):
         "request-malformed": "A request or message of a browser is not what the dashboard takes.",
         "run-ended": "The run has ended, so its record cannot be changed.",
         "run-unknown": "A run of this name is not in the directory that is served.",
+        "task-unknown": "No installed wing has the command of this task.",
         "too-many-tries": "Wrong tokens came too often from this address.",
     }
-    temporary_codes: ClassVar[frozenset[str]] = frozenset({"busy", "not-started", "port-taken"})
+    temporary_codes: ClassVar[frozenset[str]] = frozenset({"busy", "job-not-started", "not-started", "port-taken"})
 
 
 class ArchiveError(LivebodeError):
