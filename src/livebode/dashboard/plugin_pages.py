@@ -20,13 +20,11 @@ if TYPE_CHECKING:
     from livebode.dashboard.quantities import Quantities
 
 
-
 class Order(Protocol):
     """Reads the JSON of an operator."""
 
     def __call__(self, request: Request, bytes_max: int = ...) -> Awaitable[bytes | Response]:
         """The JSON, of at most so many bytes, or the answer to somebody else."""
-
 
 
 class PluginPages(Protocol):

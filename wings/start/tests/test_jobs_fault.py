@@ -12,10 +12,10 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from livebode_start.jobs import RUNNING_MAX, Job, JobOrder, Jobs, file_name
 
 from livebode.core import ServerError
 from livebode.records import RunRecord
+from livebode_start.jobs import RUNNING_MAX, Job, JobOrder, Jobs, file_name
 from tests.support.browser import until
 from tests.support.command import livebode, signals, write_csv
 
@@ -158,7 +158,9 @@ def test_a_job_of_an_earlier_server_is_not_known(jobs: Jobs) -> None:
             jobs.job(name)
 
 
-@given(st.text(max_size=80) | st.sampled_from(["..", "../a", "a/b", "a\\b", "C:a", "nul", "CON.toml", "a.", "-x", "a\0"]))
+@given(
+    st.text(max_size=80) | st.sampled_from(["..", "../a", "a/b", "a\\b", "C:a", "nul", "CON.toml", "a.", "-x", "a\0"])
+)
 def test_a_name_is_one_file_of_the_directory_on_every_system(text: str) -> None:
     try:
         name = file_name(text)

@@ -5,11 +5,13 @@ from __future__ import annotations
 import os
 import re
 import unicodedata
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
 from itertools import count
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Any
 
-from livebode.core import ServerError
+from livebode.core import LivebodeError, ServerError
 from livebode.language import Message
 from livebode.plugins import tables
 
@@ -58,10 +60,6 @@ class Workspace:
     def __init__(self, directory: Path) -> None:
         self.directory = directory.absolute()
 
-    def create(self) -> None:
-        """Create the directory if it is missing; OSError if the system refuses it."""
-        self.directory.mkdir(parents=True, exist_ok=True)
-
     def files(self) -> dict[str, os.stat_result]:
         """The plain files by name, without links and hidden ones."""
         try:
@@ -90,19 +88,40 @@ class Workspace:
             )
         return self.directory / name
 
-    def free_name(self, name: str) -> str:
-        """This name, or with a number: one that no file has."""
+    def free_name(self, name: str, taken: Collection[str] = ()) -> str:
+        """This name, or one with a number, that neither a file nor `taken` has."""
         stem, dot, ending = name.rpartition(".")
         stem, ending = (stem, dot + ending) if dot else (name, "")
-        return next(n for n in _numbered(stem) if not os.path.lexists(self.directory / f"{n}{ending}")) + ending
+        return next(other for other in _numbered(stem, ending) if other not in taken and not self._has(other))
 
     def free_stem(self, stem: str) -> str:
-        """This name, or with a number: one that neither a configuration nor a run has."""
-        taken = (lambda n: os.path.lexists(self.directory / n) or os.path.lexists(self.directory / f"{n}.toml"))
-        return next(n for n in _numbered(stem) if not taken(n))
+        """This name, or one with a number, that neither a run nor a configuration has."""
+        return next(other for other in _numbered(stem) if not self._has(other) and not self._has(f"{other}.toml"))
+
+    def check_free(self, name: str) -> None:
+        """ServerError if another program has put a file of this name here meanwhile."""
+        if self._has(name):
+            raise ServerError(
+                "busy", Message("another {name} was put here meanwhile", name=name), Message("send it again")
+            )
+
+    def _has(self, name: str) -> bool:
+        return os.path.lexists(self.directory / name)
+
+    @contextmanager
+    def short_names(self, directory: Path | None = None) -> Iterator[None]:
+        """Errors inside it name files by their names in this directory; default: the workspace."""
+        prefix = f"{directory or self.directory}{os.sep}"
+        try:
+            yield
+        except LivebodeError as error:
+            for part in ("message", "remedy", "place"):
+                if prefix in (text := getattr(error, part)):
+                    setattr(error, part, text.replace(prefix, ""))
+            raise
 
 
-def _numbered(stem: str) -> Any:
-    yield stem
+def _numbered(stem: str, ending: str = "") -> Iterator[str]:
+    yield stem + ending
     for number in count(2):
-        yield f"{stem}-{number}"
+        yield f"{stem}-{number}{ending}"
