@@ -118,7 +118,7 @@ def page_additions() -> dict[str, type[PageAddition]]:
 
 
 def workspace_pages(directory: Path) -> dict[str, WorkspacePages]:
-    """The pages of all plug-ins that work in this directory, by name; one that cannot be loaded is left out as above."""
+    """The pages of all plug-ins that work in this directory, by name; left out as above."""
     return {name: pages(directory) for name, pages in _classes("workspaces").items()}
 
 

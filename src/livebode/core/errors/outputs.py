@@ -149,7 +149,6 @@ class ServerError(LivebodeError):
         "entry-only": "This is one entry of a matrix run, with which nothing can be saved.",
         "event-unknown": "An event with this key does not exist.",
         "file-unknown": "A file of this name is not among those that the page offers.",
-        "file-unknown": "A recording of this name is not in the directory that is served.",
         "job-not-started": "The operating system did not start the process of a job.",
         "job-unknown": "A job of this name was not started since the server started.",
         "name-invalid": "The text cannot be the name of a file.",

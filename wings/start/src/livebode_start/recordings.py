@@ -1,4 +1,4 @@
-"""A recording as the page shows it: channels, proposed roles, signals, and the configuration from a person's choices."""
+"""A recording as the page shows it: channels, roles, signals, and the configuration from a person's choices."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from livebode.core import ServerError, UsageError
 from livebode.language import Message, for_page
+from livebode.plugins import named
 from livebode.preparation import Proposals, Settled, chosen_part, settled, suitable_estimator, tables_of
 from livebode.sources import Log, open_log
 from livebode_start.preview import Overview
@@ -20,6 +21,7 @@ OPEN_MAX = 4
 """Recordings in memory."""
 _CHANNELS_MAX = 500
 _NAME_MAX = 500
+_ESTIMATORS = "joint", "direct", "lpm", "welch"
 Role = Literal["excitation", "input", "output", "schedule"]
 
 
@@ -131,6 +133,8 @@ class OpenedRecording:
                 }
                 for channel in channels
             ],
+            "estimators": list(_ESTIMATORS),
+            "models": ["none", "auto", *named("models")],
             "skipped": [[skipped.name, skipped.reason] for skipped in log.skipped[:_CHANNELS_MAX]],
             "roles": {
                 role: {"channel": guess.channel, "reason": for_page(guess.reason)}
