@@ -193,6 +193,8 @@ def _show_statuses(summary: dict[str, Any]) -> None:
     """Print the numbers of valid and rejected fits, with reasons."""
     why = "".join(f"; {count} rejected: {word}" for word, count in summary["statuses"].items() if word != "ok")
     print(f"\n{counted(summary['statuses'].get('ok', 0), 'fit')} of the {summary['model']} model valid{why}")
+    if summary["unknown_gain"]:
+        print(f"  {summary['unknown_gain']}")
 
 
 def show_fit(found: Fit, of: str) -> None:

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from livebode.arrays import Floats
-from livebode.core import Model, Response, Responses, decibels, moment
+from livebode.core import COVERAGE, Model, Response, Responses, decibels, moment
 from livebode.language import tr, trn
 from livebode.pictures import ticks, words
 from livebode.pictures._style import Style, drawing, empty_note, heading, new_figure, plain, style
-from livebode.pictures.curves import MEAN_PROBABILITY, PROBABILITY, Summary, bound_db, bound_deg, summarised
+from livebode.pictures.curves import Summary, bound_db, bound_deg, summarised
 from livebode.pictures.plots import FEW_LINES, alone, band, bound
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ def bode_figure(
 
     A curve shows the median over the valid responses (separately for magnitude and phase, the phase around its mean
     direction; summary.py explains why not the complex mean), a light band their range of 5–95 %, and another colour
-    the newest valid response with its bound, which covers the true value with a probability of 99.7 %. Lines that were
+    the newest valid response with its bound, which covers the true value with a probability of 95 %. Lines that were
     never valid remain open.
 
     Parameters
@@ -214,8 +214,8 @@ def _legend(figure: Figure, look: Style, summary: Summary, fit: bool, mean: bool
     at_s = summary.newest.time_s
     newest = tr("newest, at {time}", time=moment(at_s, 2))
     if np.isfinite(summary.newest_bound).any():
-        newest += tr(", bound: {percent:.1f} % (3σ)", percent=100 * PROBABILITY)
-    average = tr("average, bound: {percent:g} %", percent=100 * MEAN_PROBABILITY)
+        newest += tr(", bound: {percent:g} %", percent=100 * COVERAGE)
+    average = tr("average, bound: {percent:g} %", percent=100 * COVERAGE)
     texts.append(average if mean else newest)
     if fit:
         handles.append(Line2D([], [], color=look.ink, linewidth=1.0, dashes=(4, 2)))

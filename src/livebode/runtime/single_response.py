@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from livebode import preparation
 from livebode.analysis import LIVE_VALUES_MAX, Overview
 from livebode.configuration import Axis
-from livebode.core import Block, Channel, Event, Lines, LivebodeError, Responses, Stateful
+from livebode.core import INTERVAL_FACTOR, Block, Channel, Event, Lines, LivebodeError, Responses, Stateful
 from livebode.estimation import Follower, Settings, plant_kinds, response_unit
 from livebode.language import Message
 from livebode.preparation import check_excitation, check_some_valid
@@ -68,7 +68,7 @@ def drift_events(drift: Mapping[str, Any], sample: int, time_s: float) -> list[E
         "{bound_percent:.1g} % from the beginning to the end; the bound of a mean contains the drift",
         line_hz=most["frequency_hz"],
         percent=most["percent"],
-        bound_percent=1.96 * most["percent_sigma"],
+        bound_percent=INTERVAL_FACTOR * most["percent_sigma"],
     )
     return [Event("drift", sample, time_s, message, {"lines": drift["lines"]})]
 

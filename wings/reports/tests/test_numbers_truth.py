@@ -124,7 +124,7 @@ def test_parameters_over_time_are_those_of_the_table(run: Path) -> None:
     ]
     curves = {name: (value, half) for name, _, value, half in picture.data["curves"]}
     np.testing.assert_array_equal(curves["Keff"][0], [row["value"] for row in rows])
-    np.testing.assert_allclose(curves["Keff"][1], 1.96 * np.array([row["sigma"] for row in rows]))
+    np.testing.assert_allclose(curves["Keff"][1], 1.959964 * np.array([row["sigma"] for row in rows]))
     (table,) = parts(document, PrintedTable, "Parameters")
     keff = next(row for row in table.rows if row[0] == "Keff")
     newest = next(row for row in reversed(rows) if row["status"] == "ok")

@@ -8,14 +8,13 @@ from typing import Any
 import numpy as np
 
 from livebode.analysis import MARGINS, loop_section
-from livebode.core import Listing, Paragraph, Part, Picture, PrintedTable, Section, moment, with_bound
+from livebode.core import INTERVAL_FACTOR, Listing, Paragraph, Part, Picture, PrintedTable, Section, moment, with_bound
 from livebode.fitting import Fit
 from livebode.language import Message, listed, number, tr, worded
 from livebode_reports.events import alarms
 from livebode_reports.parameter_track import Track
 from livebode_reports.report_data import ReportData, RunData, by_schedule
 from livebode_reports.wording import (
-    BOUND_95,
     line_table,
     lines_of,
     pairs,
@@ -47,7 +46,7 @@ def response(of: ReportData) -> Section:
     frequency = mean.lines.frequency_hz
     rows = [
         (number(f, "g"), *polar, number(c, ".4f") if isfinite(c) else "—", share(n, of.of.count))
-        for f, polar, c, n in zip(frequency, polar_rows(mean, BOUND_95), mean.coherence, of.of.valid)
+        for f, polar, c, n in zip(frequency, polar_rows(mean), mean.coherence, of.of.valid)
     ]
     headings = ("Hz", f"dB{_re(of)}", "± dB", tr("degrees"), tr("± degrees"), tr("coherence γ²"), tr("valid"))
     return Section(tr("Frequency response"), (line_table(headings, rows),))
@@ -59,11 +58,11 @@ def tracking(of: ReportData) -> Section:
     if len(shown.lines) <= _TRACES_MAX:
         shown = shown[:: -(-len(shown) // _TRACED)]
     thinned = _drawn(of, len(shown))
-    caption = tr("Magnitude at each line over time, with 99.7 % bounds{thinned}.", thinned=thinned)
+    caption = tr("Magnitude at each line over time, with 95 % bounds{thinned}.", thinned=thinned)
     if by_schedule(of.of):
         schedule = of.channels.get("schedule", tr("the schedule"))
         caption = tr(
-            "Magnitude at each line over time and over {schedule}, with 99.7 % bounds{thinned}.",
+            "Magnitude at each line over time and over {schedule}, with 95 % bounds{thinned}.",
             schedule=schedule, thinned=thinned,
         )  # fmt: skip
     data = {"responses": shown, "schedule_name": of.channels.get("schedule", "")}
@@ -83,7 +82,7 @@ def parameters(of: ReportData) -> Section | str:
     for name in dict.fromkeys([*fitted, *newest]):
         now = newest.get(name)
         mean = with_bound(*fitted[name]) if name in fitted else (tr("fixed") if now and not now.sigma else "—", "")
-        late = with_bound(now.value, 1.96 * now.sigma) if now else ("—", "")
+        late = with_bound(now.value, INTERVAL_FACTOR * now.sigma) if now else ("—", "")
         rows.append(
             (worded(name.replace("_", " ")), *mean, *late, worded(units.get(name) or (now.unit if now else "")))
         )
@@ -230,7 +229,9 @@ def _over_time(of: ReportData, track: Track, words: str) -> Picture:
     time_s = track.time_s[every]
     data = {
         "time_s": time_s,
-        "curves": [(n, track.newest[n].unit, track.values[n][every], 1.96 * track.sigmas[n][every]) for n in shown],
+        "curves": [
+            (n, track.newest[n].unit, track.values[n][every], INTERVAL_FACTOR * track.sigmas[n][every]) for n in shown
+        ],
     }
     thinned = _drawn(of, len(time_s))
     caption = tr("{what} over time, with 95 % bounds{thinned}.", what=words, thinned=thinned)
