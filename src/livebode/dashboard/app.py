@@ -24,7 +24,7 @@ from livebode.dashboard.alarm_requests import Act, alarm_request
 from livebode.dashboard.board import Board
 from livebode.dashboard.browser_socket import Client, serve_browser
 from livebode.dashboard.frames import frame
-from livebode.dashboard.guard import Guard, body
+from livebode.dashboard.guard import BODY_BYTES_MAX, Guard, body
 from livebode.dashboard.past import Past
 from livebode.dashboard.plugin_pages import (
     Answer,
@@ -139,7 +139,7 @@ class _Pages:
         self.files = files
 
     async def page(self, request: Request) -> Response:
-        if self._role(request) is None:
+        if self._board.access.role_of(request) is None:
             return RedirectResponse("/login", 303)
         return self.file("index.html")
 
@@ -194,7 +194,7 @@ class _Pages:
 
     async def signals(self, request: Request) -> Response:
         """Raw signals or their spectrum, live or at a time in the record."""
-        if self._role(request) is None:
+        if self._board.access.role_of(request) is None:
             return _unknown()
         asked = queries.signals_asked(request.query_params, len(self._board.states))
         answer = await signals(self._board, self._begun(asked.axis), asked)
@@ -268,14 +268,14 @@ class _Pages:
         job = applied(change, Past.of(state), state)
         return JSONResponse(listed(await self._board.elsewhere(change_saved, _directory(state), job)))
 
-    async def order(self, request: Request) -> bytes | Response:
-        """The JSON of an operator, or the answer to somebody else."""
-        role = self._role(request)
+    async def order(self, request: Request, bytes_max: int = BODY_BYTES_MAX) -> bytes | Response:
+        """The JSON of an operator, of at most so many bytes, or the answer to somebody else."""
+        role = self._board.access.role_of(request)
         if role is None:
             return _unknown()
         if role != "operator":
             return JSONResponse(error_answer(Message("this session is read-only")), 403)
-        data = await body(request)
+        data = await body(request, bytes_max)
         if data is None or request.headers.get("content-type", "").partition(";")[0] != "application/json":
             raise ServerError(
                 "request-malformed",
@@ -292,13 +292,9 @@ class _Pages:
         content, kind = self.files.get(name, (b"not found\n", ""))
         return Response(content, 200 if kind else 404, media_type=kind or "text/plain")
 
-    def _role(self, request: Request) -> str | None:
-        headers = request.headers
-        return self._board.access.role(headers.get("cookie", ""), headers.get("authorization", ""), _address(request))
-
     def _asked_state(self, request: Request) -> State | None:
         """The state of the axis of a query, if its run has started; None without access."""
-        if self._role(request) is None:
+        if self._board.access.role_of(request) is None:
             return None
         return self._begun(queries.span(request.query_params, len(self._board.states)).axis)
 

@@ -19,7 +19,12 @@ if TYPE_CHECKING:
     from livebode.dashboard.past import Past
     from livebode.dashboard.quantities import Quantities
 
-Order = Callable[["Request"], Awaitable["bytes | Response"]]
+
+class Order(Protocol):
+    """Reads the JSON of an operator."""
+
+    def __call__(self, request: Request, bytes_max: int = ...) -> Awaitable[bytes | Response]:
+        """The JSON, of at most so many bytes, or the answer to somebody else."""
 
 
 class PluginPages(Protocol):

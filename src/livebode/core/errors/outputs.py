@@ -145,9 +145,11 @@ class ServerError(LivebodeError):
     codes: ClassVar[Mapping[str, str]] = {
         "busy": "Too many requests wait already.",
         "cannot-listen": "The operating system does not let the dashboard listen at this address.",
+        "disk-full": "The disk has no room for an upload and the run of it.",
         "entry-only": "This is one entry of a matrix run, with which nothing can be saved.",
         "event-unknown": "An event with this key does not exist.",
         "file-unknown": "A file of this name is not among those that the page offers.",
+        "file-unknown": "A recording of this name is not in the directory that is served.",
         "job-not-started": "The operating system did not start the process of a job.",
         "job-unknown": "A job of this name was not started since the server started.",
         "name-invalid": "The text cannot be the name of a file.",
@@ -162,6 +164,8 @@ class ServerError(LivebodeError):
         "run-unknown": "A run of this name is not in the directory that is served.",
         "task-unknown": "No installed wing has the command of this task.",
         "too-many-tries": "Wrong tokens came too often from this address.",
+        "upload-incomplete": "An upload ended before its announced length.",
+        "upload-too-long": "An upload is longer than the page receives.",
     }
     temporary_codes: ClassVar[frozenset[str]] = frozenset({"busy", "job-not-started", "not-started", "port-taken"})
 

@@ -10,6 +10,10 @@ from starlette.responses import Response
 from starlette.routing import BaseRoute
 
 from livebode.dashboard import Board, Order
+from livebode_start.job_pages import JobPages
+from livebode_start.jobs import Jobs
+from livebode_start.measure_pages import MeasurePages
+from livebode_start.workspace import Workspace
 
 
 class StartPages:
@@ -24,12 +28,17 @@ class StartPages:
     static, script = Path(__file__).parent / "static", "start.js"
 
     def __init__(self, directory: Path) -> None:
-        self._directory = directory
+        self._workspace = Workspace(directory)
+        self._jobs = Jobs(self._workspace.directory)
 
     def routes(self, board: Board, file: Callable[[str], Response], order: Order) -> list[BaseRoute]:
         """Routes of the pages."""
-        return []
+        measure = MeasurePages(self._workspace, self._jobs, board, file, order)
+        return [*JobPages(self._jobs, board, order).routes, *measure.routes]
 
     async def run(self) -> None:
-        """Wait until it is cancelled."""
-        await asyncio.Event().wait()
+        """Wait until it is cancelled; then end the jobs."""
+        try:
+            await asyncio.Event().wait()
+        finally:
+            self._jobs.close()
