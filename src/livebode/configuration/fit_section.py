@@ -78,7 +78,7 @@ def chosen_model(section: FitSection, kinds: PlantKinds) -> fitting.PhysicalMode
         output = _output_of(kinds)
     # The gain model is of the motor's side only: naming it is no conflict.
     side = None if name == "two-mass-gain" and section.side == "motor" else section.side
-    options = {"side": side, "radius_m": section.radius_m, "inertia_ratio": section.inertia_ratio}
+    options: dict[str, Any] = {"side": side, "radius_m": section.radius_m, "inertia_ratio": section.inertia_ratio}
     if name == "two-mass-gain":
         options |= {"output_unit": kinds.output_unit, "input_unit": kinds.input_unit}
     return fitting.model_named(name, output=output, **options)
