@@ -147,7 +147,7 @@ def _remedy(doubts: Sequence[_UnitDoubt]) -> str:
     if doubts[0].unit == "N":
         return Message("the model is driven by a torque")
     entries = ", ".join(f'{_toml_key(doubt.name)} = "{_example(doubt)}"' for doubt in doubts)
-    return Message("state what one unit is in [source], as in {units}", units=f"units = {{ {entries} }}")
+    return Message("state what one unit is in [source] of axis.toml, as in {units}", units=f"units = {{ {entries} }}")
 
 
 def _example(doubt: _UnitDoubt) -> str:
