@@ -11,7 +11,6 @@ from pydantic import Field
 from livebode import fitting
 from livebode.configuration.section import ConfigurationSection, Positive
 from livebode.core import SI_UNITS, ConfigError, PlantKinds, UsageError
-from livebode.fitting.models import MODELS
 from livebode.language import Message
 from livebode.plugins import named
 
@@ -116,7 +115,7 @@ def _unknown(why: str, remedy: str) -> str:
 
 def _units_not_si(model: str, kinds: PlantKinds) -> Iterator[_UnitDoubt]:
     """Of known units that are not those that the model needs."""
-    torque = model in MODELS
+    torque = model in fitting.MODELS
     if kinds.input_unit and (kinds.input_unit != "N m" if torque else kinds.input_unit not in SI_UNITS):
         yield _UnitDoubt(kinds.input_name, kinds.input_unit, "torque")
     if kinds.output_unit and kinds.output_unit not in SI_UNITS:
