@@ -73,9 +73,7 @@ def _judged(name: str, source: LiveSource, heard: Survey, events: dict[str, str]
     return Check(name, "ok", message, facts=facts)
 
 
-def _without_samples(
-    name: str, source: LiveSource, reach: Reach, error: SourceError, facts: dict[str, Any]
-) -> Check:
+def _without_samples(name: str, source: LiveSource, reach: Reach, error: SourceError, facts: dict[str, Any]) -> Check:
     """Silence is a warning, since the machine may be off; what comes and cannot be used has failed."""
     senders = f" from {', '.join(sorted(source.senders))}" if source.senders else ""
     facts |= {"senders": sorted(source.senders), "malformed": len(source.unusable)}
