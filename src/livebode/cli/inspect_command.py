@@ -195,7 +195,8 @@ def _show_recording(found: Inspection, console: Console) -> None:
             extent = ["empty", ""]
         elif channel.minimum == channel.maximum:
             extent[1] = "constant"
-        table.add_row(channel.name, channel.unit, channel.kind, *extent, str(channel.not_finite or ""))
+        unit = f"{channel.unit} (from {channel.source_unit})" if channel.source_unit else channel.unit
+        table.add_row(channel.name, unit, channel.kind, *extent, str(channel.not_finite or ""))
     # A name that is shortened to the width of the terminal cannot be given to a run.
     console.width = max(
         console.width, Measurement.get(console, console.options.update(max_width=_WIDTH_MAX), table).maximum

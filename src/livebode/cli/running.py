@@ -18,7 +18,7 @@ import typer
 
 from livebode.cli import terminal
 from livebode.cli.failures import exit_code_of
-from livebode.cli.notices import NoticePrinter
+from livebode.cli.notices import NoticePrinter, PercentPrinter
 from livebode.cli.options import parsed_band
 from livebode.cli.pictures import draw, load_beside, tell_how_to_draw, tracked_amount
 from livebode.cli.remote import recorded_at
@@ -28,7 +28,7 @@ from livebode.core import ConfigError, LocationError, RecordError, UsageError
 from livebode.estimates import rule
 from livebode.locations import Location, Url, local_copy, location, original
 from livebode.records import check_removable, is_run, to_json
-from livebode.runtime import Destination, Document, Outcome, StoppedError, Subscriber, TrackerResults, run
+from livebode.runtime import Destination, Document, Outcome, StoppedError, Subscriber, TrackerResults, next_run, run
 from livebode.sources import read_head
 
 if TYPE_CHECKING:
@@ -73,8 +73,12 @@ def run_targets(
     axes: Axes = _axes(places, over, each) if file is None else file.read()
     live = any(axis.source.live for axis in axes.values())
     alone = axes.get("")
-    place = Path("runs") / target.stem if out is None else location(out)
     segments = live or any(axis.record is not None for axis in axes.values())
+    place: Location = Path("runs") / target.stem
+    if out is not None:
+        place = location(out)
+    elif not force and (live or not segments):  # the record of a recording with a journal continues
+        place = next_run(Path("runs") / target.stem, axes)
     with recorded_at(place, segments=segments) as (directory, send):
         if alone is None:
             _check_places(directory, axes, force=force)
@@ -278,7 +282,8 @@ def _run(
 def _with_progress(job: Callable[[tuple[Subscriber, ...]], Outcome], quiet: bool) -> Outcome:
     """Run a job whose subscribers show notices and, on a terminal, a progress bar."""
     if quiet or not terminal.is_terminal(stderr=True):
-        return job((NoticePrinter(lambda message: _print_notice(terminal.console(stderr=True), message)),))
+        notices = NoticePrinter(lambda message: _print_notice(terminal.console(stderr=True), message))
+        return job((notices, PercentPrinter()) if terminal.prints_percent else (notices,))
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
     columns = (

@@ -9,7 +9,6 @@ from livebode.sources.live.batch import SAMPLE_MAX as SAMPLE_MAX
 from livebode.sources.live.batch import VALUES_MAX as VALUES_MAX
 from livebode.sources.live.batch import Batch as Batch
 from livebode.sources.live.batch import LiveBlock as LiveBlock
-from livebode.sources.live.batch import with_kinds as with_kinds
 from livebode.sources.live.computer_clock import ClockReading as ClockReading
 from livebode.sources.live.connection import pieces as pieces
 from livebode.sources.live.datagrams import receiver as receiver

@@ -19,7 +19,7 @@ from livebode.core import Channel, Event, LivebodeError, SourceError, SpectraLay
 from livebode.language import Message
 from livebode.sources.live.address import Address
 from livebode.sources.live.backlog_cause import BacklogCause
-from livebode.sources.live.batch import LiveBlock, with_kinds
+from livebode.sources.live.batch import LiveBlock
 from livebode.sources.live.computer_clock import ClockReading, pause
 from livebode.sources.live.dropped import Dropped
 from livebode.sources.live.health import Health
@@ -33,6 +33,7 @@ from livebode.sources.live.settled import SettledDeliveries
 from livebode.sources.live.source_events import SourceEvents
 from livebode.sources.live.spectra_batch import AnyBatch
 from livebode.sources.live.unconfirmed import CONFIRMED
+from livebode.sources.quantities import Quantities
 
 TICK_S = 0.1
 """Longest time until a request to end is detected."""
@@ -84,6 +85,7 @@ class LiveSource(ABC):
 
     def __init__(self, settings: SourceSettings, address: Address) -> None:
         self.settings, self.address = settings, address
+        self._quantities = Quantities(settings.kinds, settings.units)
         # Also of a source of another package: what is below "livebode" is in its log.
         self._logger = logging.getLogger(f"{__package__}.{type(self).__module__.rpartition('.')[2]}")
         self._events = SourceEvents(log=self._log)
@@ -252,7 +254,7 @@ class LiveSource(ABC):
                 self._raise_failure()
                 raise self._refused or self._silence(asked)
             self._take(TICK_S)
-        self._check_kinds()
+        self._check_declared()
         self._log(logging.INFO, f"{len(self.channels)} channels at {self.rate_hz:.9g} Hz")
         return self
 
@@ -370,10 +372,10 @@ class LiveSource(ABC):
             open_ = inf
         self._settled.read(int(min(self._taken_delivery, open_ - 1)), self._sequencer.number)
 
-    def _check_kinds(self) -> None:
-        """SourceError if a kind is declared for a channel that the stream does not have."""
+    def _check_declared(self) -> None:
+        """SourceError if a kind or a unit is declared for a channel that the stream does not have."""
         names = [channel.name for channel in self.channels]
-        for name in self.settings.kinds:
+        for name in self._quantities.names:
             if name not in names:
                 self.close()
                 raise channel_unknown(name, names)
@@ -433,7 +435,7 @@ class LiveSource(ABC):
     def _announce(self, channels: tuple[Channel, ...], rate_hz: float) -> None:
         """Set the channels of a record that continues; they are known before new samples arrive."""
         if self._resumed is not None:
-            self._sequencer.schema.announce(with_kinds(channels, self.settings.kinds), rate_hz)
+            self._sequencer.schema.announce(self._quantities.of(channels), rate_hz)
 
     def _lost_connection(self, why: str) -> None:
         if not self._outage:
@@ -456,7 +458,7 @@ class LiveSource(ABC):
         """Add a batch to the queue; `waits`: whether its sender can wait, where it is not the same for all batches."""
         now = time.monotonic()
         self.backlog_cause.take(self.waiting_s, now)
-        batch = batch.with_kinds(self.settings.kinds) if self.settings.kinds else batch
+        batch = batch.in_si(self._quantities)
         self._pauses.reset()
         latency = None
         if batch.stamp_s is not None:
