@@ -17,6 +17,7 @@ from livebode.preparation import (
     ChannelCheck,
     configured_part,
     early_spikes,
+    hop_event,
     make_follower,
     make_settings,
     roles_in_doubt,
@@ -68,7 +69,7 @@ def examined(axis: Axis, log: Log, follower: Follower, shift: int = 0) -> Examin
     """Examine a recording as a whole; the follower leaves out what does not fit, at the file's numbers plus `shift`."""
     settings = follower.settings
     noticed = [Event("roles-doubtful", 0, 0.0, message) for message in roles_in_doubt(axis, log, settings)]
-    noticed += window_in_doubt(axis, log, settings)
+    noticed += window_in_doubt(axis, log, settings) + hop_event(axis, log, settings)
     slips = slips_of(log, settings)
     if slips:
         noticed.append(slip_event(slips, settings))
