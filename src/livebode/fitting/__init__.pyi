@@ -43,6 +43,7 @@ from livebode.fitting.problem import described as described
 from livebode.fitting.rational import Rational as Rational
 from livebode.fitting.rational import fit_rational as fit_rational
 from livebode.fitting.rational import rational_of as rational_of
+from livebode.fitting.rows import NO_RESPONSE as NO_RESPONSE
 from livebode.fitting.separable import Outputs as Outputs
 from livebode.fitting.separable import SeparatedFit as SeparatedFit
 from livebode.fitting.separable import pole_price as pole_price

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from livebode import fitting, preparation
 from livebode.analysis import LIVE_VALUES_MAX, Overview
 from livebode.configuration import Axis
-from livebode.core import Block, Channel, Event, Lines, LivebodeError, Response, Responses, Stateful
+from livebode.core import INTERVAL_FACTOR, Block, Channel, Event, Lines, LivebodeError, Response, Responses, Stateful
 from livebode.estimation import Follower, Settings, plant_kinds, response_unit
 from livebode.language import Message
 from livebode.preparation import check_excitation, check_some_valid
@@ -69,7 +69,7 @@ def drift_events(drift: Mapping[str, Any], sample: int, time_s: float) -> list[E
         "at one time, run a part of the recording (--from, --to)",
         line_hz=most["frequency_hz"],
         percent=most["percent"],
-        bound_percent=1.96 * most["percent_sigma"],
+        bound_percent=INTERVAL_FACTOR * most["percent_sigma"],
     )
     return [Event("drift", sample, time_s, message, {"lines": drift["lines"]})]
 

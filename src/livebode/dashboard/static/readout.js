@@ -2,7 +2,7 @@
 // The values at the cursor, their bounds and distances from the measured curve; what lies between the fixed cursors.
 import { moment } from "./clock.js";
 import { differences } from "./cursors.js";
-import { halfDeg, highDb, holds, lowDb } from "./frames.js";
+import { halfDeg, highDb, lowDb } from "./frames.js";
 import { tr } from "./language.js";
 import { element } from "./make.js";
 import { nameOf } from "./names.js";
@@ -36,13 +36,6 @@ function where(frame, schedule) {
   if (!Number.isFinite(at)) return tr("at {time}", { time });
   const place = `${schedule.name || tr("schedule")} ${fixed(at, 3)} ${schedule.unit}`;
   return tr("at {time}, {place}", { time, place });
-}
-
-/** @param {Frame} frame */
-function bands(frame) {
-  const [dof] = frame.dof;
-  if (Number.isNaN(dof)) return tr("bands are ±3σ");
-  return tr("bands are ±3σ and cover the true value with {percent} %", { percent: fixed(100 * holds(dof), 2) });
 }
 
 /**
@@ -134,9 +127,9 @@ export function readout(host, hz, found, schedule, bode) {
   const rows = rowsOf(found, bode);
   const frame = found.measured?.frame;
   const words = bode.operation
-    ? tr("bands are ±3σ; the errors of A and B are taken as independent")
+    ? tr("bounds: 95 %; the errors of A and B are taken as independent")
     : frame
-      ? `${where(frame, schedule)}; ${bands(frame)}`
+      ? tr("{where}; bounds: 95 %", { where: where(frame, schedule) })
       : tr("no response yet");
   host.replaceChildren(
     element(
