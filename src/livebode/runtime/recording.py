@@ -28,6 +28,7 @@ from livebode.preparation import (
     window_in_doubt,
 )
 from livebode.records import content_sha256
+from livebode.runtime.documents import RunStep
 from livebode.runtime.estimate import ExaminedRecording
 from livebode.runtime.recorder import Destination
 from livebode.runtime.single_response import SingleResponse
@@ -45,11 +46,13 @@ def examined_recordings(axis: Axis, logs: Sequence[Log], to: Destination) -> Exa
 
         return examined_uneven(axis, log)
     log = configured_part(axis, log)
+    to.announce(RunStep("lines"))
     follower = make_follower(axis, log)
     log = log.naming(axis.signals.named)
     estimate = SingleResponse.of(axis, follower, log.channels)
     log = log.naming(estimate.channels)  # with the covariates of a baseline
     to.prepare()
+    to.announce(RunStep("examining"))
     of, settings = examined(axis, log, follower), follower.settings
     if settings.quantity == "plant" and settings.periodic:
         estimate.drift = fitting.DriftTest(settings.lines)
