@@ -12,7 +12,17 @@ from typing import Any
 from livebode.analysis import Overview
 from livebode.core import Block, Event, Parameters, Responses
 from livebode.dashboard.signal_tap import SignalTap
-from livebode.runtime import Channels, ClockSet, Document, FitResults, RunControl, RunEnded, RunStarted, TrackerResults
+from livebode.runtime import (
+    Channels,
+    ClockSet,
+    Document,
+    FitResults,
+    RunControl,
+    RunEnded,
+    RunStarted,
+    RunStep,
+    TrackerResults,
+)
 from livebode.sources.live import Health, LiveBlock
 
 Item = Responses | tuple[Parameters, ...] | Event
@@ -37,6 +47,8 @@ class Hub:
         self.name = name
         self.directory: Path | None = None
         self.begun: Mapping[str, Any] | None = None
+        self.complete = False
+        """Whether no more samples follow: the run draws its pictures, and ends."""
         self.ended: Mapping[str, Any] | None = None
         self.overview: Overview | None = None
         self.samples = self.gaps = self.given_up = 0
@@ -75,6 +87,8 @@ class Hub:
                 self.signals.begin(used, (self.begun or {}).get("found", {}).get("window", 0))
             case ClockSet(pieces):
                 self.clock = pieces
+            case RunStep("ending"):
+                self.complete = True
             case RunEnded(summary):
                 self.ended = summary
 
@@ -86,7 +100,7 @@ class Hub:
         with self._lock:  # buffered data belong to a previous run, whose lines may differ
             self._rows, self._values = deque(), 0
         self.directory, self.control, self.overview = started.directory, started.control, started.overview
-        self.ended = None
+        self.ended, self.complete = None, False
         self.followed_s, self.clock = time.monotonic(), ()
         self.intervals_s.clear()
         self.begun = started.summary

@@ -341,7 +341,7 @@ class State:
         """How long no samples have arrived, and whether that is longer than usual."""
         assert self.hub is not None
         silent_s, usual_s = time.monotonic() - self.hub.followed_s, median([*self.hub.intervals_s, 0.0])
-        return silent_s, silent_s > max(_SILENT_S, 3 * usual_s)
+        return silent_s, not self.hub.complete and silent_s > max(_SILENT_S, 3 * usual_s)
 
     def backlog_s(self) -> float | None:
         """How far tracking is behind the source, if that is more than a person expects."""
