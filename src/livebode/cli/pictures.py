@@ -65,9 +65,9 @@ def draw_titled(estimate: SingleResponse, into: Path, *, title: str, names: tupl
         return
     from livebode.pictures import save_pictures  # with Matplotlib half a second to import
 
-    schedule, fitted = estimate.schedule_label, estimate.fit
+    schedule, fitted, mean = estimate.schedule_label, estimate.fit, estimate.average
     with _ONE_AT_A_TIME:
-        save_pictures(responses, into, title=title, schedule_name=schedule, names=names, fitted=fitted)
+        save_pictures(responses, into, title=title, schedule_name=schedule, names=names, fitted=fitted, mean=mean)
 
 
 def load_beside() -> None:
@@ -93,6 +93,7 @@ def show(outcome: Outcome) -> None:
             height=max(16, min(size.lines - 4, 36)),
             colour=is_terminal() and "NO_COLOR" not in os.environ,
             unicode="utf" in (sys.stdout.encoding or "").lower(),
+            mean=outcome.average,
         )
     )
     print(f"{tracked_amount(outcome.summary)}\n{original(str(outcome.directory))}/")
@@ -194,6 +195,8 @@ def _show_statuses(summary: dict[str, Any]) -> None:
     """Print the numbers of valid and rejected fits, with reasons."""
     why = "".join(f"; {count} rejected: {word}" for word, count in summary["statuses"].items() if word != "ok")
     print(f"\n{counted(summary['statuses'].get('ok', 0), 'fit')} of the {summary['model']} model valid{why}")
+    if summary["unknown_gain"]:
+        print(f"  {summary['unknown_gain']}")
 
 
 def show_fit(found: Fit, of: str) -> None:

@@ -26,8 +26,10 @@ from livebode.core._spectra import SPIKE as SPIKE
 from livebode.core._spectra import Spectra as Spectra
 from livebode.core._spectra import SpectraLayout as SpectraLayout
 from livebode.core._spectra import rms as rms
+from livebode.core._unit_reading import SI_UNITS as SI_UNITS
 from livebode.core._unit_reading import QuantityKind as QuantityKind
 from livebode.core._unit_reading import UnitReading as UnitReading
+from livebode.core._unit_reading import read_quantity as read_quantity
 from livebode.core._unit_reading import read_unit as read_unit
 from livebode.core._unit_reading import split_plant_unit as split_plant_unit
 from livebode.core._wording import counted as counted

@@ -20,6 +20,7 @@ from livebode.fitting.least_squares import minimise as minimise
 from livebode.fitting.mean import RunningMean as RunningMean
 from livebode.fitting.mean import mean_matrix as mean_matrix
 from livebode.fitting.mean import mean_response as mean_response
+from livebode.fitting.mean import with_drift as with_drift
 from livebode.fitting.mean_of_recordings import RecordingScatter as RecordingScatter
 from livebode.fitting.mean_of_recordings import RecordingsMean as RecordingsMean
 from livebode.fitting.models import model_named as model_named

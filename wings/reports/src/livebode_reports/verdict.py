@@ -45,7 +45,7 @@ def of_measurement(*findings: Iterable[Finding]) -> list[Finding]:
 
 def _record(of: RunData) -> list[Finding]:
     findings = []
-    if not of.run.finished:
+    if not of.run.ended:
         findings.append(
             Finding(
                 "check",
