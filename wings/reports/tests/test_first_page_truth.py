@@ -4,16 +4,27 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
+from datetime import UTC, datetime
 from pathlib import Path
 
+import numpy as np
 import pytest
 from pypdf import PdfReader
 
+from livebode.fitting import EvaluationGrid, Fitter, TwoMass
+from livebode_reports.answers import answers
+from livebode_reports.parameter_track import Newest, Track
+from livebode_reports.report_data import read
+from livebode_reports.run_report import run_report
 from tests.support.command import livebode
+from tests.support.reports import LINES, measured, plant, strokes, write_run
 from tests.support.servo import Servo, write_axis
 
 BEFORE = Servo()
 AFTER = Servo(stiffness=BEFORE.stiffness * 11 / 12, damping=BEFORE.damping)
+MADE = datetime(2026, 11, 21, 12, tzinfo=UTC)
+MOVING_FIT = {"model": "two-mass", "output": "velocity", "radius_m": 0.019}
 LIMITS = """
 [[report.limits]]
 quantity = "resonance_hz"
@@ -60,6 +71,38 @@ def test_a_perfect_measurement_is_headed_by_its_results(runs: tuple[Path, Path],
         assert words not in text
     page = (tmp_path / "r.html").read_text("utf-8").split("</header>")[0]
     assert re.search(r"<tr><th scope=\"row\">resonance</th><td class=\"value\">[\d.]+ ± [\d.]+ Hz</td>", page)
+
+
+def test_without_a_model_the_peak_of_the_lines_is_the_answer(tmp_path: Path) -> None:
+    path = write_axis(tmp_path, "axis", BEFORE, 3)
+    path.write_text(path.read_text("utf-8").split("[fit]")[0], encoding="utf-8")
+    assert livebode("run", path, "--out", tmp_path / "run").code == 0
+    document = run_report(tmp_path / "run", made=MADE)
+    (answer,) = document.answers
+    low, high = map(float, re.search(r"peak between (\S+) and (\S+) Hz", answer.name).groups())  # type: ignore[union-attr]
+    assert low < BEFORE.resonance_hz < high == low + 8
+    assert re.fullmatch(r"[\d.]+ ± [\d.]+ dB at 76 Hz", answer.value)
+
+
+def test_of_an_axis_that_moved_the_range_over_the_travel_is_the_answer(tmp_path: Path) -> None:
+    """A belt whose stiffness goes with the place, between both ends of what 90 % of the responses have."""
+    x = strokes(400)
+    stiffness = 5e5 * (1 + 0.2 * (x - 0.5))
+    model, grid = TwoMass(radius_m=0.019), EvaluationGrid(LINES.frequency_hz, 4000.0)
+    true = np.array([model.at(np.array([0.0028, 6.7, k, 130.0, 0, 0, 0]), grid) for k in stiffness])
+    one = measured(400, 1, noise=0.002, schedule=x)
+    responses = replace(one, value=one.value / plant(LINES.frequency_hz, 62.0) * true)
+    path = write_run(tmp_path / "run", responses, configuration={"signals": {"output": "y"}, "fit": MOVING_FIT})
+    run = read(path)
+    fitted = Fitter("two-mass", radius_m=0.019).process(responses)
+    track = Track(run.of.overview.time_s, model="two-mass")
+    for name, unit, value, sigma in zip(fitted.names, fitted.units, fitted.value.T, fitted.sigma.T):
+        track.values[name], track.sigmas[name] = value, sigma
+        track.newest[name] = Newest(value[-1], sigma[-1], unit, 1.0, "ok")
+    found = {a.name: a.value for a in answers(replace(run, tracks={"two-mass": track}))}
+    low, high, bound = re.fullmatch(r"(\d+) … (\d+) N/m \(± (\S+)\)", found["belt stiffness"]).groups()  # type: ignore[union-attr]
+    ends = np.quantile(stiffness, (0.05, 0.95))
+    assert np.all(np.abs(np.array([float(low), float(high)]) - ends) < 2 * float(bound)), (low, high, ends)
 
 
 @pytest.mark.parametrize(
