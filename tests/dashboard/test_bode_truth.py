@@ -166,10 +166,10 @@ def test_margins_within_the_band_are_marked_on_magnitude_and_phase(tab: Tab) -> 
     marks = tab.page.evaluate(
         """async () => {
           const { marginMarks } = await import("/static/fitted.js");
-          const one = (name, unit, v, s) => [name, { name, unit, t: [1], v: [v], s: [s], at: () => 0 }];
+          const one = (name, unit, v, s) => [name, { name, unit, shown: { t: 1, v, s, status: "ok" } }];
           return marginMarks(new Map([one("gain_margin", "dB", 8, 0.5), one("gain_margin_frequency", "Hz", 90, 1),
             one("phase_margin", "deg", 45, 2), one("phase_margin_frequency", "Hz", 30, 1),
-            one("delay_margin", "ms", 45 / 360 / 30 * 1000, 0.1), one("delay_margin_frequency", "Hz", 30, 1)]), NaN);
+            one("delay_margin", "ms", 45 / 360 / 30 * 1000, 0.1), one("delay_margin_frequency", "Hz", 30, 1)]));
         }"""
     )
     gain, phase = marks
@@ -404,7 +404,7 @@ def test_references_have_names_and_survive_another_quantity_and_a_reload(tab: Ta
     tab.page.keyboard.press("u")
     tab.page.keyboard.press("u")
     tab.until("!bode.curves.reference && !bode.operation")
-    tab.page.locator("#pause").click()  # the moment is in the address too
+    tab.js("timeline.newest()")  # the moment is in the address too
     tab.until("timeline.atS === null && bode.drawn.measured")
 
 

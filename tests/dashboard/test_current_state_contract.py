@@ -119,7 +119,7 @@ def test_the_sentence_says_what_has_changed_until_it_is_over(browser: Browser) -
     with axes(browser, "y") as ([hub], tab):
         now(hub, at_s=1.0)
         word = tab.page.locator("#verdict")
-        assert re.match("○ Not assessed: no baseline|◆ Check: no samples for ", word.inner_text())
+        assert re.match("○ No baseline: not monitored|◆ Check: no samples for ", word.inner_text())
         change = {"what": "stiffness", "amount_percent": -9.04, "since_s": 0.05}
         hub(Event("change", 1, 0.1, "stiffness is 9 % less", change))
         word.get_by_text("⚠ ALARM: belt 9.0 % softer since 0.05 s").wait_for()

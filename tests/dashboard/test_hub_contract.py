@@ -199,7 +199,8 @@ def test_a_trend_is_evenly_thinned_however_it_came(sizes: list[int]) -> None:
     assert len(set(np.diff(kept.time_s))) <= 1
     assert kept.time_s[0] == 0
     assert np.array_equal(kept.value[:, 1], 3 * kept.time_s)
-    assert [(one["name"], one["value"]) for one in trend.plain(whole=False)] == [
+    assert trend.newest is not None
+    assert [(one["name"], one["value"]) for one in trend.plain(trend.newest)] == [
         ("Js", [2.0 * (at - 1)]), ("mL", [3.0 * (at - 1)]),
     ]  # fmt: skip
 

@@ -38,6 +38,13 @@ function where(frame, schedule) {
   return tr("at {time}, {place}", { time, place });
 }
 
+/** The time of the fit, where it is not that of the response. @param {Found} found */
+function fitted({ measured, model }) {
+  const timeS = model?.frame?.timeS[0];
+  if (timeS === undefined || timeS === measured?.frame?.timeS[0]) return "";
+  return tr("fitted model at {time}", { time: moment(timeS, true) });
+}
+
 /** @param {Frame} frame */
 function bands(frame) {
   const [dof] = frame.dof;
@@ -136,7 +143,7 @@ export function readout(host, hz, found, schedule, bode) {
   const words = bode.operation
     ? tr("bands are ±3σ; the errors of A and B are taken as independent")
     : frame
-      ? `${where(frame, schedule)}; ${bands(frame)}`
+      ? [where(frame, schedule), fitted(found), bands(frame)].filter(Boolean).join("; ")
       : tr("no response yet");
   host.replaceChildren(
     element(

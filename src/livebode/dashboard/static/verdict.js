@@ -104,7 +104,7 @@ const SENTENCES = {
   suppressed: (v) => tr("Not assessed: not ready since {time}", { time: sinceOf(v) }),
   "not-monitored": (v) => tr("Not monitored since {time}: too little is known of the machine", { time: sinceOf(v) }),
   healthy: () => tr("Healthy: no difference from the baseline"),
-  "no-baseline": () => tr("Not assessed: no baseline"),
+  "no-baseline": () => tr("No baseline: not monitored"),
   "not-judged": () => tr("Not assessed: the baseline does not cover what the machine did"),
   "not-begun": () => tr("Not assessed: waiting for the first samples"),
 };
