@@ -40,6 +40,7 @@ class Hub:
         self.ended: Mapping[str, Any] | None = None
         self.overview: Overview | None = None
         self.samples = self.gaps = self.given_up = 0
+        self._complete = False
         self.intervals_s: deque[float] = deque(maxlen=_INTERVALS)
         self.followed_s = 0.0
         """`time.monotonic()` of the newest samples, or of the start of the run."""
@@ -67,8 +68,9 @@ class Hub:
             case Event():
                 with self._lock:
                     self._events.append(document)
-            case TrackerResults(block):
+            case TrackerResults(block, samples, total):
                 self._count(block)
+                self._complete = total is not None and samples >= total
             case RunStarted():
                 self._begin(document)
             case Channels(used):
@@ -77,6 +79,11 @@ class Hub:
                 self.clock = pieces
             case RunEnded(summary):
                 self.ended = summary
+
+    @property
+    def ending(self) -> bool:
+        """Whether no more samples are expected: the recording is at its end, or a person ended the run."""
+        return self._complete or (self.control is not None and self.control.ended)
 
     def record(self, event: Event) -> bool:
         """Record an event of a person; False if the run has ended or too many are waiting."""
@@ -87,6 +94,7 @@ class Hub:
             self._rows, self._values = deque(), 0
         self.directory, self.control, self.overview = started.directory, started.control, started.overview
         self.ended = None
+        self._complete = False
         self.followed_s, self.clock = time.monotonic(), ()
         self.intervals_s.clear()
         self.begun = started.summary

@@ -347,7 +347,7 @@ class State:
         delays = np.array(hub.delays_s) * 1e3
         health_facts |= {"samples": hub.samples, "gaps": hub.gaps, "given_up": hub.given_up}
         silent_s, stale = self.silence()
-        health_facts |= {"silent_s": silent_s, "stale": stale, "backlog_s": self.backlog_s()}
+        health_facts |= {"ending": hub.ending, "silent_s": silent_s, "stale": stale, "backlog_s": self.backlog_s()}
         if delays.size:
             health_facts |= {"behind_ms": float(np.median(delays)), "behind_p99_ms": float(np.quantile(delays, 0.99))}
         if (health := hub.health) is not None:
@@ -355,10 +355,10 @@ class State:
         return health_facts
 
     def silence(self) -> tuple[float, bool]:
-        """How long no samples have arrived, and whether that is longer than usual."""
+        """How long no samples have arrived, and whether that is longer than usual; not while the run is completed."""
         assert self.hub is not None
         silent_s, usual_s = time.monotonic() - self.hub.followed_s, median([*self.hub.intervals_s, 0.0])
-        return silent_s, silent_s > max(_SILENT_S, 3 * usual_s)
+        return silent_s, silent_s > max(_SILENT_S, 3 * usual_s) and not self.hub.ending
 
     def backlog_s(self) -> float | None:
         """How far tracking is behind the source, if that is more than a person expects."""

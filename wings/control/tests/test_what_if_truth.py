@@ -402,3 +402,22 @@ def test_the_worst_plant_of_the_demo_is_stable_in_its_loop() -> None:
     known = ~band.above
     distance, reach = np.abs(1 + band.value * behind)[:, known], (band.radius * np.abs(behind))[:, known]
     assert (reach < 0.8 * distance).all(), (reach / distance).max(axis=1)
+
+
+def test_the_sliders_are_first_and_the_open_loop_is_shown_when_one_moves(browser: Browser, run: Path) -> None:
+    dashboard = Dashboard(ServerSettings("127.0.0.1", 0))
+    dashboard.view(run)
+    with dashboard, Tab(browser, dashboard.url + "#sliders=1") as tab:
+        tab.until("whatIf.facts")
+        tab.settle()
+        for control in (tab.page.get_by_role("button", name="add a notch"), tab.page.get_by_label("gain").first):
+            box = control.bounding_box()
+            assert box
+            assert 0 < box["y"] < 900 - box["height"], "on the first screen of 1440 × 900"
+        table = tab.page.locator("#what-if-margins").bounding_box()
+        assert table
+        assert box["y"] < table["y"]
+        assert tab.js("bode.quantity") == "plant"
+        tab.page.locator('#what-if-rows [type=range][data-part="gain"]').press("ArrowRight")
+        tab.until("bode.quantity === 'open loop' && bode.curves['what if']")
+        assert tab.wrong == []

@@ -10,6 +10,7 @@ import { curvesMenu } from "./curves-menu.js";
 import { describe } from "./describe.js";
 import { Events } from "./events.js";
 import { delayMs, marginMarks, modes } from "./fitted.js";
+import { folds } from "./fold.js";
 import { framesOf, QUANTITIES } from "./frames.js";
 import { health } from "./health.js";
 import { tr } from "./language.js";
@@ -19,7 +20,8 @@ import { firstLook } from "./look.js";
 import { Lost } from "./lost.js";
 import { byId as $, choose, element, segments } from "./make.js";
 import { LineMap } from "./map.js";
-import { isMargin, Margins, marginWords } from "./margins.js";
+import { isMargin, Margins, marginWords as marginTitle } from "./margins.js";
+import { marginWords } from "./marks.js";
 import { notable } from "./notable.js";
 import { past } from "./past.js";
 import { readout } from "./readout.js";
@@ -51,6 +53,7 @@ const NO_POSITION = tr("This run has no position: name its channel as schedule u
 const REFERENCE_GONE = tr("A new run with other lines or another quantity has started: the references were released.");
 
 applyTheme();
+folds();
 /** @type {Page} */
 const page = {
   axis: 0,
@@ -94,7 +97,7 @@ const parameters = new Trends(
   tr("No model is fitted: add [fit] to the configuration."),
 );
 const margins = new Margins($("margins"));
-const marginTrends = new Trends($("margin-trends"), isMargin, "", marginWords);
+const marginTrends = new Trends($("margin-trends"), isMargin, "", marginTitle);
 const events = new Events(
   {
     host: $("events"),
@@ -407,6 +410,7 @@ function status() {
   $("lamp").className = `lamp ${look}`;
   // The long name of an entry is in the choice beside it: twice there, the header would need a second row.
   $("status-text").textContent = facts.begun && facts.matrix ? word : `${facts.name} · ${word}`;
+  $("status").title = facts.name;
   lost.show(known, timeline.span.live && timeline.atS === null);
   firstLook(page);
   wall.draw();
@@ -433,6 +437,13 @@ function aim(facts) {
   bode.aimed = fitted || !facts.model;
 }
 
+function showMargins() {
+  const words = marginWords(bode);
+  if ($("margin-words").textContent === words) return;
+  $("margin-words").textContent = words;
+  $("margin-words").hidden = !words;
+}
+
 /** @param {Run} facts */
 function showResult(facts) {
   const words = resultWords(facts, bode, parameters);
@@ -456,6 +467,7 @@ function draw(now) {
   if (due("bode", 0)) {
     bode.draw();
     aim(page.facts);
+    showMargins();
   }
   if (due("fits", 0)) {
     showResult(page.facts);

@@ -130,6 +130,8 @@ export interface Health {
   samples?: number;
   gaps?: number;
   given_up?: number;
+  /** No more samples are expected. */
+  ending?: boolean;
   silent_s?: number;
   stale?: boolean;
   /** of tracking, if a person must know of it; see state.py */

@@ -39,9 +39,7 @@ function fittedWords(bode, parameters) {
     return tr("Resonance {hz}, damping {percent} %", { hz: value, percent: damping(ratio) });
   }
   if (modes.length) {
-    const words = modes
-      .slice(0, MODES_MAX)
-      .map(({ value, damping: ratio }) => tr("{hz} ({percent} %)", { hz: value, percent: damping(ratio) }));
+    const words = modes.slice(0, MODES_MAX).map(({ value, damping: ratio }) => `${value} (${damping(ratio)} %)`);
     const more = modes.length - words.length;
     return tr("Resonances (damping) {list}", {
       list: [words.join(", "), more ? tr("and {more} more", { more }) : ""].filter(Boolean).join(" "),

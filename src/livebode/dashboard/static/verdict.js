@@ -26,7 +26,8 @@ export function lamp({ up, facts, health }, { live, growing }, paused) {
   if (paused) return [tr("paused"), "paused"];
   if (!live) return growing ? [tr("being recorded"), ""] : [tr("recorded"), ""];
   if (!health) return [tr("waiting for data"), "stale"];
-  const { source, stale, silent_s: silentS = 0, backlog_s: backlogS } = health;
+  const { source, stale, silent_s: silentS = 0, backlog_s: backlogS, ending } = health;
+  if (ending) return [tr("completing the record"), ""];
   if (source && !source.connected) return [tr("not connected, silent for {time}", { time: seconds(silentS) }), "stale"];
   if (stale) return [tr("silent for {time}", { time: seconds(silentS) }), "stale"];
   if (backlogS) return [tr("{time} behind", { time: seconds(backlogS) }), "stale"];

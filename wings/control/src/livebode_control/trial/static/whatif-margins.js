@@ -152,10 +152,15 @@ function wideWords({ frequency_hz: hz, known, lines_hz: lines }, places, found) 
   if (!found || found.worst || keepsClear(places, known)) return "";
   const { place, at, share } = widest(places, known),
     near = Math.max(hz[at], lines[0]);
-  const where = places.length > 1 ? tr(" at place {n} of {count}", { n: place + 1, count: places.length }) : "";
+  const words = { hz: hertz(Number(near.toPrecision(3))), percent: plain(100 * share, 2) };
+  if (places.length === 1)
+    return tr(
+      "Unstable possible: the response near {hz} Hz is known only within ± {percent} %. A longer measurement, or more excitation there, makes the bound narrower.",
+      words,
+    );
   return tr(
-    "Unstable possible: the response near {hz} Hz{where} is known only within ± {percent} %. A longer measurement, or more excitation there, makes the bound narrower.",
-    { hz: hertz(Number(near.toPrecision(3))), where, percent: plain(100 * share, 2) },
+    "Unstable possible: at place {n} of {count} the response near {hz} Hz is known only within ± {percent} %. A longer measurement, or more excitation there, makes the bound narrower.",
+    { ...words, n: place + 1, count: places.length },
   );
 }
 
