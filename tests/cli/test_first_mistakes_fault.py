@@ -5,6 +5,7 @@ from __future__ import annotations
 import zipfile
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import livebode as package
@@ -38,7 +39,12 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "key.toml").write_text('[source]\nlog = "log.csv"\n[signals]\nexcitaton = "w"\noutput = "y"\n')
     (folder / "section.toml").write_text('[source]\nlog = "log.csv"\n[tracking]\nlines = "20"\n')
     (folder / "broken.toml").write_text("[source\n")
-    write_csv(folder / "log.csv", signals())
+    given = signals()
+    write_csv(folder / "log.csv", given)
+    speeds = {"speed1": given["y"], "speed2": -given["y"]}
+    write_csv(folder / "axes.csv", {name: given[name] for name in "twu"} | speeds)
+    rng = np.random.default_rng(3)
+    write_csv(folder / "noise.csv", {"t": given["t"]} | {name: rng.standard_normal(2000) for name in "ab"})
     roles = ("--excitation", "w", "--input", "u", "--output", "y")
     assert livebode("run", folder / "log.csv", *roles, "--out", folder / "runs/monday").code == 0
     return folder
@@ -47,7 +53,12 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 MISTAKES = [
     ("run nofile.csv", "there is no file nofile.csv"),
     ("run directory", "directory is a directory"),
-    ("run log.csv", "the output channel is not named"),
+    ("run log.csv --input u", "the output channel is not named"),
+    (
+        "run axes.csv",
+        "the output could be 'speed1' or 'speed2'; give --output CHANNEL; `livebode inspect axes.csv --out",
+    ),
+    ("run noise.csv", "the input is not recognised among t, a, b; give --output CHANNEL; `livebode inspect noise.csv"),
     ("run log.csv --output yy", "did you mean 'y'?"),
     ("run log.csv --excitation w --input u --output y --lines 20-140 --window 100", "cannot be read"),
     ("run log.csv --excitation w --input u --output y --lines 55 --window 100", "the nearest lines are 50 and 60 Hz"),

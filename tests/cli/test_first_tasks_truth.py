@@ -40,12 +40,12 @@ def test_the_reference_of_the_torque_is_the_input_and_a_velocity_goes_before_a_p
     assert shlex.split(line) == ["livebode", "run", str(out)]  # the shell finds one file
 
 
-def test_an_input_that_is_not_recognised_is_asked_for_among_the_channels(tmp_path: Path) -> None:
+def test_an_input_that_no_channel_can_be_is_asked_for_among_the_channels(tmp_path: Path) -> None:
     given = signals()
-    write_csv(tmp_path / "log.csv", {"t": given["t"], "w": given["w"], "b": given["u"], "y": given["y"]})
+    write_csv(tmp_path / "log.csv", {"t": given["t"], "w": given["w"], "y": given["y"]})
     refused = livebode("inspect", tmp_path / "log.csv", "--yes", "--out", tmp_path / "axis.toml")
     assert refused.code == 2
-    assert "the input channel is not recognised among t, w, b, y; give --input CHANNEL" in refused.err
+    assert "the input channel is not recognised among w, y; give --input CHANNEL" in refused.err
 
 
 def test_a_comparison_without_a_fit_says_why_it_has_no_parameters(log: Path) -> None:

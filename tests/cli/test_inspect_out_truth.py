@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from livebode.interface import write_examples
+from livebode.plugins import named
 from tests.support.command import livebode, signals, write_csv
 from tests.support.terminals import on_terminal
 
@@ -48,17 +49,22 @@ def test_a_chirp_that_does_not_repeat_is_for_the_local_polynomial_method(folder:
     assert written(folder, "chirp.csv")["tracking"] == {"estimator": "lpm"}
 
 
-def test_without_units_the_names_suffice_and_without_both_the_sentence_lists_the_channels(tmp_path: Path) -> None:
+def test_without_units_names_or_the_samples_suffice(tmp_path: Path) -> None:
     given = signals()
     write_csv(tmp_path / "log.csv", given)
     assert written(tmp_path, "log.csv")["signals"] == {"excitation": "w", "input": "u", "output": "y"}
-    renamed = {"t": given["t"], "a": given["w"], "b": given["u"], "c": given["y"]}
+    renamed = {"t": given["t"], "c": given["y"], "b": given["u"], "a": given["w"]}
     write_csv(tmp_path / "names.csv", renamed)
-    refused = livebode("inspect", tmp_path / "names.csv", "--yes", "--out", tmp_path / "other.toml")
-    assert refused.code == 2
-    assert "not recognised among t, a, b, c; give --output CHANNEL" in refused.err
-    roles = written(tmp_path, "names.csv", "--output", "c", "--input", "b")["signals"]
-    assert roles == {"excitation": "a", "input": "b", "output": "c"}  # the only channel that repeats exactly
+    for options in ((), ("--output", "c"), ("--output", "c", "--input", "b")):
+        assert written(tmp_path, "names.csv", *options)["signals"] == {"excitation": "a", "input": "b", "output": "c"}
+
+
+def test_of_signals_that_have_nothing_to_do_with_each_other_the_sentence_lists_the_channels(tmp_path: Path) -> None:
+    rng = np.random.default_rng(2)
+    write_csv(tmp_path / "log.csv", {"t": signals()["t"]} | {name: rng.standard_normal(2000) for name in "abc"})
+    refused = livebode("inspect", tmp_path / "log.csv", "--yes", "--out", tmp_path / "other.toml")
+    assert (refused.code, (tmp_path / "other.toml").exists()) == (2, False)
+    assert "not recognised among a, b, c; give --output CHANNEL" in refused.err
 
 
 def test_exchanged_roles_are_refused_and_nothing_is_written(folder: Path) -> None:
@@ -122,7 +128,7 @@ def test_json_gives_the_configuration(folder: Path) -> None:
 def test_on_a_terminal_it_lists_the_channels_asks_again_after_a_wrong_name_and_takes_numbers(folder: Path) -> None:
     out = folder / "asked.toml"
     answers = [
-        ("Excitation", "nonsense"), ("select one", "2"), ("Input", ""), ("Output", "velocity"), ("Schedule", "-"),
+        ("Excitation", "nonsense"), ("select one", "1"), ("Input", ""), ("Output", "velocity"), ("Schedule", "-"),
         ("Estimator", ""), ("Average", "n"), ("Model", "two-mass"),
     ]  # fmt: skip
     code, text = on_terminal(
@@ -132,6 +138,46 @@ def test_on_a_terminal_it_lists_the_channels_asks_again_after_a_wrong_name_and_t
     assert "torque" in text
     assert tomllib.loads(out.read_text("utf-8"))["signals"] == {"excitation": "w", "input": "u", "output": "velocity"}
     assert "[fit]" in out.read_text("utf-8")
+
+
+def test_an_answer_that_the_recording_contradicts_is_asked_again_and_the_others_are_kept(folder: Path) -> None:
+    out = folder / "again.toml"
+    answers = [
+        ("Excitation", "w"), ("Input", "velocity"), ("Output", "u"), ("Schedule", "-"), ("Estimator", "joint"),
+        ("Average", "y"), ("Model", "two-mass"), ("look exchanged", ""), ("Output", ""),
+    ]  # fmt: skip
+    code, text = on_terminal(
+        "inspect", folder / "standstill.csv", "--out", out, columns=160, kind="dumb", answers=answers
+    )
+    assert (code, text.count("Model to fit"), text.count("Excitation, the signal")) == (0, 1, 1), text
+    table = tomllib.loads(out.read_text("utf-8"))
+    assert table["signals"] == {"excitation": "w", "input": "u", "output": "velocity"}
+    assert table["fit"] == {"model": "two-mass"}
+
+
+def test_a_recording_without_time_and_names_is_asked_for_its_rate_and_proposes_all_else(tmp_path: Path) -> None:
+    given = signals()
+    write_csv(tmp_path / "log.csv", {"Sample": np.arange(2000), **dict(zip(("Ch1", "Ch2", "Ch3"), (
+        given["y"], given["w"], given["u"],
+    )))})  # fmt: skip
+    out = tmp_path / "axis.toml"
+    answers = [("Rate", "-5"), ("not a positive number", "1000"), *((word, "") for word in (
+        "Excitation", "Input", "Output", "Schedule", "Estimator", "Average", "Model",
+    ))]  # fmt: skip
+    code, text = on_terminal("inspect", tmp_path / "log.csv", "--out", out, columns=160, kind="dumb", answers=answers)
+    assert code == 0, text
+    table = tomllib.loads(out.read_text("utf-8"))
+    assert table["signals"] == {"excitation": "Ch2", "input": "Ch3", "output": "Ch1"}
+    assert table["source"]["rate_hz"] == 1000.0
+    assert livebode("run", out, "--out", tmp_path / "run").code == 0
+
+
+def test_the_models_of_plugins_are_offered_too(folder: Path) -> None:
+    question = on_terminal(
+        "inspect", folder / "standstill.csv", "--out", folder / "models.toml", columns=160, kind="dumb",
+        answers=[(word, "") for word in ("Excitation", "Input", "Output", "Schedule", "Estimator", "Average", "Model")],
+    )[1]  # fmt: skip
+    assert all(model in question for model in named("models"))
 
 
 def test_the_schedule_is_not_proposed_for_a_position_that_only_vibrates(tmp_path: Path) -> None:

@@ -152,3 +152,33 @@ def test_the_installed_command_prints_a_plot_and_ends_with_0(log: Path, tmp_path
     assert done.returncode == 0, done.stderr
     assert "magnitude in dB" in done.stdout
     assert "3 lines" in done.stdout
+
+
+def test_a_run_without_channels_states_the_roles_in_a_line_and_is_the_run_that_names_them(
+    log: Path, tmp_path: Path
+) -> None:
+    proposed = livebode("run", log, "--out", tmp_path / "proposed")
+    assert (proposed.code, proposed.err.count("\n")) == (0, 1), proposed.err
+    assert "roles: excitation w (repeats every 20 samples (0.02 s)), input u (by its name), output y" in proposed.err
+    assert livebode("run", log, *JOINT, "--out", tmp_path / "named").code == 0
+    one, other = (pq.read_table(tmp_path / name / "responses.parquet") for name in ("proposed", "named"))
+    assert all(np.array_equal(one[column], other[column], equal_nan=True) for column in ("re", "im", "sigma"))
+    assert livebode("run", log, "--estimator", "lpm", "--out", tmp_path / "lpm").code == 0
+    stored = json.loads((tmp_path / "lpm" / "run.json").read_text())
+    assert stored["configuration"]["tracking"]["estimator"] == "lpm"
+
+
+def test_a_run_of_noise_without_names_takes_the_estimator_for_it(tmp_path: Path) -> None:
+    rng = np.random.default_rng(5)
+    u = rng.standard_normal(40000)
+    y = np.convolve(u, 0.9 ** np.arange(80))[: u.size] + 0.01 * rng.standard_normal(u.size)
+    write_parquet(tmp_path / "noise.parquet", {"t": np.arange(u.size) / RATE_HZ, "p": y, "q": u})
+    result = livebode("run", tmp_path / "noise.parquet", "--out", tmp_path / "run")
+    assert "input q (the other channels respond to it), output p (responds to q)" in result.err
+    stored = json.loads((tmp_path / "run" / "run.json").read_text())
+    assert stored["configuration"]["tracking"]["estimator"] == "lpm"
+    table = pq.read_table(tmp_path / "run" / "responses.parquet").to_pydict()
+    z = np.exp(-2j * np.pi * np.array(table["frequency_hz"]) / RATE_HZ)
+    value = np.array(table["re"]) + 1j * np.array(table["im"])
+    known = np.array(table["valid"])
+    assert np.median(np.abs(value * (1 - 0.9 * z) - 1)[known]) < 0.01

@@ -16,7 +16,7 @@ KINDS = get_args(QuantityKind)
 
 # Kind and SI units in one, from the definitions of the units: 1 N = 1 kg m/s², 1 min = 60 s, 1 rev = 2 pi rad.
 BY_HAND = [
-    ("torque", 1.0, "N m; Nm; N·m; N*m; N.m; N-m; kg m²/s²; kg m^2 s^-2; kg·m²·s⁻²; [N m]"),
+    ("torque", 1.0, "N m; Nm; N·m; N*m; N.m; 牛米; 牛·米; N-m; kg m²/s²; kg m^2 s^-2; kg·m²·s⁻²; [N m]"),
     ("torque", 1e-3, "mN m; mNm; N mm; Nmm"),
     ("torque", 1e-2, "Ncm; N cm"),
     ("torque", 1e3, "kNm; kN m"),
@@ -27,17 +27,20 @@ BY_HAND = [
     ("velocity", 1.0, "rad/s; rad s^-1; rad·s⁻¹; rad s-1; rad s**-1; rad s^(-1); rad / s; (rad)/(s)"),
     ("velocity", 1.0, "1/s; s^-1; m/s; m s⁻¹"),
     ("velocity", 1e-3, "mm/s; mrad/s; m/s*mm/m"),
-    ("velocity", 2 * pi / 60, "rpm; RPM; rev/min; r/min; U/min; turn/min"),
-    ("velocity", pi / 180, "°/s; deg/s; degree/s; degrees/s"),
-    ("velocity", 1 / 60, "m/min; 1/min; min⁻¹; min^-1"),
+    ("velocity", 2 * pi / 60, "rpm; RPM; rev/min; r/min; U/min; turn/min; 1/min; min⁻¹; min^-1; min-1; /min; 转/分"),
+    ("velocity", 2 * pi, "rev/s; U/s; rps; 转/秒"),
+    ("velocity", pi / 180, "°/s; deg/s; degree/s; degrees/s; Grad/s; 度/秒"),
+    ("velocity", 1 / 60, "m/min"),
     ("position", 1.0, "rad; m"),
     ("position", 1e-6, "µm; μm; um; urad"),
     ("position", 1e-3, "mm; mrad"),
-    ("position", pi / 180, "°; deg"),
+    ("position", pi / 180, "°; deg; Grad; 度"),
+    ("position", pi / 180e3, "mdeg"),
     ("position", 2 * pi, "rev; turn"),
     ("acceleration", 1.0, "rad/s²; rad/s^2; rad/s2; rad/s/s; rad s^-2; rad/(s s); rad/(s*s); m/s²; m/s2; 1/s²; s⁻²"),
     ("acceleration", 1e-3, "mm/s²"),
     ("acceleration", pi / 180, "°/s²; deg/s^2"),
+    ("acceleration", 2 * pi / 60, "rpm/s; 1/min/s; U/min/s"),
     ("acceleration", 9.80665, "g; gn; G"),
     ("acceleration", 9.80665e-3, "mg"),
 ]  # fmt: skip
@@ -56,7 +59,6 @@ def test_a_recognised_unit_gives_the_kind_and_the_factor_of_its_dimension(text: 
     assert read_unit(text).kind == kind
     assert read_unit(text).factor == pytest.approx(factor, rel=1e-12)
     assert Channel("x", text).kind == kind
-    assert Channel("x", text).factor == read_unit(text).factor
 
 
 @pytest.mark.parametrize("text", OTHER)
@@ -98,13 +100,13 @@ def test_the_unit_of_a_plant_is_split_into_those_of_output_and_input() -> None:
         for input in ("N m", "A", "kg m/(s^2)"):
             assert split_plant_unit(f"{output}/({input})") == (output, input)
     assert [split_plant_unit(text) for text in ("", "dB", "m/A", ")", "m)")] == [("", "")] * 5
-    assert PlantKinds.of_unit("rpm/(mN m)") == PlantKinds("velocity", "torque", 1e-3, pi / 30)
-    assert PlantKinds.of_unit("dB") == PlantKinds("other", "other")
+    assert PlantKinds.of_unit("rad/s/(N m)") == PlantKinds("velocity", "torque", "rad/s", "N m")
+    assert PlantKinds.of_unit("dB") == PlantKinds("other", "other", "dB", "dB")
     assert PlantKinds.of_unit("") == PlantKinds(None, None)
 
 
 def test_a_declared_kind_wins_over_the_unit_and_a_wrong_one_is_rejected() -> None:
     assert Channel("speed", "counts", "velocity").stated_kind == "velocity"
-    assert (Channel("speed", "rad", "velocity").kind, Channel("speed", "deg", "velocity").factor) == ("velocity", 1.0)
+    assert Channel("speed", "rad", "velocity").kind == "velocity"
     with refused(UsageError, "not-one-of", argument="kind", value="speed", allowed=list(KINDS)):
         Channel("speed", "rad/s", "speed")  # type: ignore[arg-type]

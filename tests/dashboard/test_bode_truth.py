@@ -14,6 +14,7 @@ import pytest
 from playwright.sync_api import Browser
 
 from livebode.configuration import LoopSection
+from livebode.core import CIRCLE_FACTOR
 from livebode.dashboard import Dashboard, ServerSettings, grid_hz
 from livebode.fitting import EvaluationGrid, model_named
 from livebode.records import RunRecord, read_saved
@@ -99,9 +100,9 @@ def test_derivatives_and_integrals_have_value_bounds_and_unit(tab: Tab, run: Pat
     choose(tab, "power", str(power))
     one = newest(run)
     factor = (2j * np.pi * F) ** power
-    value, sigma = one.value * factor, one.sigma * np.abs(factor)
+    value, radius = one.value * factor, one.bound() * np.abs(factor)
     assert np.allclose(drawn(tab, 0, "measured"), 20 * np.log10(np.abs(value)), **CLOSE)
-    assert np.allclose(drawn(tab, 0, "measured", 1), 20 * np.log10(np.abs(value) + 3 * sigma), **CLOSE)
+    assert np.allclose(drawn(tab, 0, "measured", 1), 20 * np.log10(np.abs(value) + radius), **CLOSE)
     truth = np.degrees(np.angle(value))
     assert np.allclose(same_turn(drawn(tab, 1, "measured"), truth), truth, **CLOSE)
     label = tab.js("bode.charts[0].axes[1].label(bode.charts[0])")
@@ -325,7 +326,7 @@ def test_a_ratio_and_a_difference_have_first_order_bounds(tab: Tab) -> None:
         {
             "db": (20 * np.log10(np.abs(x))).tolist(),
             "deg": np.degrees(np.angle(x)).tolist(),
-            "reach": (3 * s / np.abs(x)).tolist(),
+            "reach": (CIRCLE_FACTOR * s / np.abs(x)).tolist(),
         }
         for x, s in ((a, sigma[0]), (b, sigma[1]))
     ]
@@ -346,7 +347,7 @@ def test_a_ratio_and_a_difference_have_first_order_bounds(tab: Tab) -> None:
         assert np.allclose(same_turn(np.array(one["deg"]), np.degrees(np.angle(truth))), np.degrees(np.angle(truth)))
         # 40,000 draws: sigma is known to 0.5 %; second order adds less than (0.02 / 0.1)².
         rms = np.sqrt(np.median(np.abs(scattered - truth) ** 2, axis=0) / np.log(2))
-        assert np.allclose(np.array(one["reach"]) * np.abs(truth) / 3, rms, rtol=0.05)
+        assert np.allclose(np.array(one["reach"]) * np.abs(truth) / CIRCLE_FACTOR, rms, rtol=0.05)
 
 
 def test_a_curve_computed_from_measured_and_model_is_drawn_with_its_band(tab: Tab, run: Path) -> None:
@@ -357,7 +358,7 @@ def test_a_curve_computed_from_measured_and_model_is_drawn_with_its_band(tab: Ta
     assert np.allclose(drawn(tab, 0, "result"), 20 * np.log10(np.abs(one.value)) - model, **CLOSE)
     assert np.allclose(
         drawn(tab, 0, "result", 1) - drawn(tab, 0, "result"),
-        20 * np.log10(1 + 3 * one.sigma / np.abs(one.value)),
+        20 * np.log10(1 + one.bound() / np.abs(one.value)),
         **CLOSE,
     )
     assert tab.js("bode.charts[0].axes[1].label(bode.charts[0])") == "|A/B| in dB"

@@ -93,7 +93,7 @@ def test_a_visit_to_an_axis_with_one_line_leaves_the_choice_of_lines(browser: Br
         begin(hubs[1], Path("/nowhere"), ONE)
         tab.page.locator("#tracking-lines [data-line='1']").click()
         chosen = tab.js("tracking.chosen")
-        assert len(chosen) == 7
+        assert 1 in chosen
         for axis, lines in (("1", 1), ("0", 13)):
             tab.page.locator("#axis").select_option(axis)
             tab.until(f"page.facts.begun && tracking.lines.length === {lines}")

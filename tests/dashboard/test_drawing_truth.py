@@ -12,7 +12,7 @@ import pytest
 from playwright.sync_api import Browser
 
 from livebode.configuration import LoopSection
-from livebode.core import Response
+from livebode.core import CIRCLE_FACTOR, Response, widened
 from livebode.dashboard import Dashboard, ServerSettings, grid_hz
 from livebode.estimation import convert
 from livebode.fitting import EvaluationGrid, model_named
@@ -60,9 +60,9 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def expected(one: Response, quantity: str) -> dict[str, np.ndarray]:
-    """Magnitude and phase with the edges of ±3σ, and coherence, as NumPy has them."""
+    """Magnitude and phase with the edges of the 95 % bound, and coherence, as NumPy has them."""
     value, slope = convert(quantity, one.value, FEEDBACK)  # type: ignore[arg-type]
-    size, reach = np.abs(value), 3 * one.sigma * np.abs(slope)
+    size, reach = np.abs(value), one.bound() * np.abs(slope)
     with np.errstate(invalid="ignore", divide="ignore"):
         low = np.where(reach < size, 20 * np.log10(np.maximum(size - reach, 1e-300)), -1000.0)
         half = np.degrees(np.where(reach < size, np.arcsin(np.minimum(reach / size, 1)), np.pi))
@@ -130,7 +130,7 @@ def test_drawn_pixels_are_at_the_positions_of_the_numbers(browser: Browser, whol
         assert len(measured) == len(LINES) - 1
         for red, green, blue, alpha in measured:
             assert (red, green, blue, alpha) == (0x00, 0x72, 0xB2, 255)
-        assert len(ends) >= 8
+        assert len(ends) >= 4  # of the other lines the bound is smaller than the point
         for inside, outside in ends:
             assert inside[3] > 0, inside
             assert inside[2] > inside[0] + 40, inside
@@ -193,7 +193,7 @@ def test_tracking_and_map_are_those_of_the_record(browser: Browser, whole: Path)
         assert real.sum() >= len(complete) - 1
         assert x[0] == pytest.approx(responses.time_s[complete[0]])
         size = np.where(responses.valid[at, line], np.abs(responses.value[at, line]), np.nan)
-        reach = 3 * responses.sigma[at, line]
+        reach = responses.bound()[at, line]
         with np.errstate(invalid="ignore", divide="ignore"):
             assert np.allclose(first[real], 20 * np.log10(size)[real], equal_nan=True, **CLOSE)
             assert np.allclose(high[real], 20 * np.log10(size + reach)[real], equal_nan=True, **CLOSE)
@@ -248,10 +248,11 @@ def test_the_baseline_is_drawn_where_the_machine_is(browser: Browser, whole: Pat
             tab.until(f"{series(0, 'baseline')}.some(Number.isFinite)")
             tab.page.wait_for_timeout(100)
             bin = int((tab.js("bode.curves.measured.frame.schedule[0]") - table.low) / table.step)
-            spread = np.sqrt(np.einsum("lii->l", table.covariance[bin, way]))
+            sigma = np.sqrt(np.einsum("lii->l", table.covariance[bin, way]))
+            spread = widened(sigma, float(table.count[bin, way]), CIRCLE_FACTOR)
             found = drawn(tab, 0, "baseline")
             assert np.allclose(found, 20 * np.log10(np.abs(table.mean[bin, way])), **CLOSE)
-            assert np.allclose(drawn(tab, 0, "baseline", 1) - found, 20 * np.log10(1 + 3 * spread), **CLOSE)
+            assert np.allclose(drawn(tab, 0, "baseline", 1) - found, 20 * np.log10(1 + spread), **CLOSE)
         assert tab.page.locator("#legend [data-name=baseline]").is_visible()
         assert tab.wrong == []
 

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from livebode.analysis import Overview
 from livebode.configuration import LoopSection
-from livebode.core import Block, Event, Lines, Responses, ServerError
+from livebode.core import CIRCLE_FACTOR, Block, Event, Lines, Responses, ServerError, widened
 from livebode.dashboard import Hub, Past, Quantities
 from livebode.dashboard.alarm_requests import acknowledgement
 from livebode.dashboard.board import verdict
@@ -59,10 +59,11 @@ def test_frames_hold_the_responses(responses: Responses) -> None:
     assert (first["kind"], first["axis"], second["kind"]) == ("rows", 3, "newest")
     use, size = responses.valid & np.isfinite(responses.value), np.abs(responses.value)
     with np.errstate(invalid="ignore"):
+        alone = np.sqrt(responses.sigma**2 - responses.distortion**2)
         expected = {
             "magnitude": np.where(use, responses.magnitude_db, np.nan),
-            "reach": np.where(use, 3 * responses.sigma / np.abs(responses.value), np.nan),
-            "noise": np.where(use, 3 * np.sqrt(responses.sigma**2 - responses.distortion**2) / size, np.nan),
+            "reach": np.where(use, responses.bound() / size, np.nan),
+            "noise": np.where(use, widened(alone, responses.dof[:, np.newaxis], CIRCLE_FACTOR) / size, np.nan),
             "coherence": np.where(use, responses.coherence, np.nan),
         }
     for name, values in expected.items():

@@ -50,11 +50,11 @@ def show(tab: Tab, kind: str) -> None:
 
 
 def loop(run: Path) -> tuple[np.ndarray, np.ndarray]:
-    """The newest open loop at the lines and its sigma: the plant times the controller of the configuration."""
+    """The newest open loop at the lines and its bound: the plant times the controller of the configuration."""
     responses = RunRecord.open(run).responses()
     newest = responses[int(np.flatnonzero(responses.valid.any(axis=1))[-1])]
     feedback = LoopSection.model_validate(LOOP).build(RATE_HZ).feedback_at(F)
-    return newest.value * feedback, newest.sigma * np.abs(feedback)
+    return newest.value * feedback, newest.bound() * np.abs(feedback)
 
 
 def traced(tab: Tab, name: str, key: str) -> np.ndarray:
@@ -66,11 +66,11 @@ def scales(tab: Tab) -> list[float]:
 
 
 def test_points_radii_and_outlines_are_those_of_the_loop(tab: Tab, run: Path) -> None:
-    value, sigma = loop(run)
+    value, bound = loop(run)
     show(tab, "nyquist")
     assert np.allclose(traced(tab, "measured", "x") + 1j * traced(tab, "measured", "y"), value, **CLOSE)
     radius = tab.numbers("bode.plane.traced.find((t) => t.name === 'measured').curve.reach") * np.abs(value)
-    assert np.allclose(radius, 3 * sigma, **CLOSE)
+    assert np.allclose(radius, bound, **CLOSE)
     show(tab, "nichols")
     assert np.allclose(traced(tab, "measured", "y"), 20 * np.log10(np.abs(value)), atol=2e-4)
     angle = traced(tab, "measured", "x") - np.degrees(np.angle(value))

@@ -180,6 +180,8 @@ def test_every_key_does_what_the_help_lists(browser: Browser, whole: Path) -> No
     dashboard.view(whole)
     with dashboard, Tab(browser, dashboard.url) as tab:
         page = tab.page
+        tab.until("bode.curves.model")
+        tab.js("bode.go(20)")
         page.keyboard.press("ArrowRight")
         page.keyboard.press("ArrowRight")
         page.keyboard.press("ArrowLeft")

@@ -369,7 +369,7 @@ def test_a_printed_page_has_whole_curves_inside_its_margins(
     blue = np.flatnonzero((magnitude[..., :3] == MEASURED).all(axis=-1).any(axis=0))
     assert np.ptp(blue) > 0.85 * magnitude.shape[1], "from the first to the last line, in the colours of light"
     text = "".join(page.extract_text() for page in pages)
-    for words in ("run · livebode", "Not assessed", "phase margin", "a sample is not", "13 lines", "2.95 s"):
+    for words in ("run · livebode", "not monitored", "phase margin", "a sample is not", "13 lines", "2.95 s"):
         assert words in text
     for words in ("Download", "Freeze", "alarms only"):
         assert words not in text

@@ -57,6 +57,13 @@ def test_no_line_but_of_a_table_or_a_picture_is_longer_than_the_style_allows(pag
     assert not [n for n, line in lines if len(line) > COLUMNS and not line.startswith(("|", "!["))]
 
 
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_what_is_on_no_index_is_installed_from_the_clone(page: Path) -> None:
+    """Only the page of the installation names an index, and says that no release is there yet."""
+    if page.name != "install.md":
+        assert not re.findall(r"pipx? install[^`#\n]*(?<![\w/])livebode\b", page.read_text("utf-8"))
+
+
 def spans(page: Path) -> list[str]:
     """The code in the sentences of a page, each on one line, but for the names of file formats (`livebode run`)."""
     text = re.sub(r"^.*`format`.*$", "", prose(page), flags=re.M)

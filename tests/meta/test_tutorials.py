@@ -18,14 +18,14 @@ TUTORIALS = sorted(page for page in FOLDER.glob("*.md") if page.stem != "index")
 CELL = re.compile(r"^```\{code-cell\}\n((?::[^\n]*\n)*)(.*?)^```$", re.M | re.S)
 
 
-def livebode(command: str) -> None:
+def run_command(command: str) -> None:
     """A line `!livebode …` of a cell, in this process."""
     app(shlex.split(command), standalone_mode=False)
 
 
 def as_python(cell: str) -> str:
     """The cell with its commands as calls."""
-    return re.sub(r"^!livebode (.*)$", lambda line: f"livebode({line.group(1)!r})", cell, flags=re.M)
+    return re.sub(r"^!livebode (.*)$", lambda line: f"run_command({line.group(1)!r})", cell, flags=re.M)
 
 
 @pytest.mark.parametrize("page", TUTORIALS, ids=lambda page: page.stem)
@@ -36,7 +36,7 @@ def test_every_cell_of_a_tutorial_runs_and_its_checks_hold(
     matplotlib.use("Agg")
     cells = [cell for _, cell in CELL.findall(page.read_text("utf-8"))]
     assert any("assert " in cell for cell in cells), "a tutorial checks what it states"
-    names: dict[str, Any] = {"livebode": livebode}
+    names: dict[str, Any] = {"run_command": run_command}
     try:
         for number, cell in enumerate(cells, 1):
             exec(compile(as_python(cell), f"{page.name}, cell {number}", "exec", dont_inherit=True), names)

@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from livebode.cli.pictures import tracked_amount
-from livebode.core import Lines, Responses
+from livebode.core import CIRCLE_FACTOR, COVERAGE, Lines, Responses
 from livebode.pictures import bode_figure, quantiles, spread, terminal_bode, tracking_figure, unwrapped, with_holes
-from livebode.pictures.curves import BOUND_C, PROBABILITY
 from livebode.pictures.tracking import is_falling
 from livebode.preparation import ChannelCheck
 from livebode.runtime.run_counts import RunCounts
@@ -51,10 +50,10 @@ def test_the_bode_plot_draws_medians_and_the_newest_in_decibels_and_degrees() ->
 
 
 def test_the_bars_reach_as_far_as_the_bound_of_the_stated_probability() -> None:
-    assert pytest.approx(PROBABILITY) == 1 - np.exp(-(BOUND_C**2))
+    assert pytest.approx(COVERAGE) == 1 - np.exp(-(CIRCLE_FACTOR**2))
     run = resonant()
     magnitude, phase, _ = bode_figure(run).axes
-    newest, radius = np.abs(run.value[-1]), run[len(run) - 1].bound(BOUND_C)
+    newest, radius = np.abs(run.value[-1]), run[len(run) - 1].bound()
     bars = np.array([bar[:, 1] for bar in drawn(magnitude, "bound")[0].get_segments()])
     np.testing.assert_allclose(bars, 20 * np.log10(np.column_stack([newest - radius, newest + radius])))
     turns = np.array([bar[:, 1] for bar in drawn(phase, "bound")[0].get_segments()])
@@ -119,8 +118,8 @@ def test_tracking_draws_each_line_against_time_with_gaps_and_its_bound() -> None
         np.testing.assert_allclose(trace.get_ydata(), expected[:, i])
     bands = [band.get_datalim(axes.transData) for band in drawn(axes, "bound")]
     for i, band in enumerate(bands):
-        assert band.y0 == pytest.approx(np.nanmin(expected[:, i]) + 20 * np.log10(1 - 0.02 * BOUND_C))
-        assert band.y1 == pytest.approx(np.nanmax(expected[:, i]) + 20 * np.log10(1 + 0.02 * BOUND_C))
+        assert band.y0 == pytest.approx(np.nanmin(expected[:, i]) + 20 * np.log10(1 - 0.02 * CIRCLE_FACTOR))
+        assert band.y1 == pytest.approx(np.nanmax(expected[:, i]) + 20 * np.log10(1 + 0.02 * CIRCLE_FACTOR))
     assert {text.get_text() for text in axes.texts} == {f"{f:g} Hz" for f in LINES.frequency_hz}
 
 

@@ -43,12 +43,13 @@ def test_a_bode_plot_has_the_decibels_the_unwrapped_degrees_and_the_bounds() -> 
     delay_s = 0.009  # 2.9 degrees for each Hz: 1.2 turns over the lines
     f = LINES.frequency_hz
     response = one(0.5 * np.exp(-2j * np.pi * f * delay_s), 0.05)
+    radius = 0.05 * np.sqrt(-np.log(0.05))  # of a normal complex error, |error|²/sigma² is exponential
     magnitude, phase = response.plot()
     np.testing.assert_allclose(magnitude.lines[0].get_ydata(), response.magnitude_db)
     np.testing.assert_allclose(np.diff(phase.lines[1].get_ydata()), -360 * delay_s * 20)
     for axes, low, high in (
-        (magnitude, 20 * np.log10(0.5 - 0.1), 20 * np.log10(0.5 + 0.1)),
-        (phase, -np.degrees(np.arcsin(0.2)), np.degrees(np.arcsin(0.2))),
+        (magnitude, 20 * np.log10(0.5 - radius), 20 * np.log10(0.5 + radius)),
+        (phase, -np.degrees(np.arcsin(radius / 0.5)), np.degrees(np.arcsin(radius / 0.5))),
     ):
         (bars,) = [found for found in axes.collections if isinstance(found, LineCollection)]
         ends = np.array([segment[:, 1] for segment in bars.get_segments()])
@@ -73,7 +74,7 @@ def test_a_bound_of_the_nichols_chart_is_the_image_of_the_circle(radius: float, 
     value = np.exp(1j * angle)
     figure, axes = plt.subplots()
     response = one(np.full(7, value), radius / 2)
-    response.plot("nichols", axes=axes)
+    response.plot("nichols", axes=axes, c=2.0)
     for polygon in polygons(axes):
         back = 10 ** (polygon[:, 1] / 20) * np.exp(1j * np.radians(polygon[:, 0]))
         on_circle = np.isclose(np.abs(back - value), radius, rtol=1e-6)
@@ -119,7 +120,7 @@ def test_it_draws_on_the_axes_that_are_given_and_opens_no_figure(kind: str) -> N
     assert list(np.atleast_1d(found)) == list(np.atleast_1d(other)) == list(np.atleast_1d(axes))
     first = panels[0]
     assert first.get_legend() is None
-    assert first.get_legend_handles_labels()[1] == ["one", "two", "bound: 98.2 % (2σ)"]
+    assert first.get_legend_handles_labels()[1] == ["one", "two", "bound: 95 %"]
     assert same_color(first.lines[0].get_color(), "C3")
     plt.close(figure)
 

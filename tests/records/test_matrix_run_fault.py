@@ -15,7 +15,7 @@ from livebode.records.summary_file import to_document
 from tests.support.errors import refused
 from tests.support.gantry_runs import gantry_axis, gantry_block, gantry_log, gantry_run
 
-NO_KIND = {"output": None, "input": None, "input_factor": 1.0, "output_factor": 1.0}
+NO_KIND = {"output": None, "input": None, "output_unit": "", "input_unit": ""}
 
 
 @pytest.fixture(scope="module")

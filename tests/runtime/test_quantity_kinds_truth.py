@@ -20,7 +20,7 @@ from livebode.estimation import Settings, Tracker
 from livebode.records import RUN, RunRecord
 from livebode.records.summary_file import to_document
 from livebode.runtime import Destination, run
-from livebode.sources import open_log
+from livebode.sources import Quantities, open_log
 from livebode.sources.live import SourceSettings, SpectraBatch, open_source
 from livebode_design.measured_axis import MeasuredAxis, MeasuredSection
 from tests.support.command import LINES, signals, write_csv, write_parquet
@@ -66,7 +66,7 @@ def plain(tmp_path_factory: pytest.TempPathFactory) -> RunRecord:
 @pytest.mark.parametrize(("y", "u"), [(" [rad s^-1]", " [Nm]"), (" [1/s]", " [N·m]"), (" [rad·s⁻¹]", " [kg m²/s²]")])
 def test_another_spelling_of_the_units_changes_no_number(tmp_path: Path, plain: RunRecord, y: str, u: str) -> None:
     found = tracked(tmp_path, y, u)
-    assert found.kinds == plain.kinds == PlantKinds("velocity", "torque")
+    assert found.kinds == plain.kinds == PlantKinds("velocity", "torque", "rad/s", "N m")
     for name in NUMBERS:
         np.testing.assert_array_equal(getattr(found.responses(), name), getattr(plain.responses(), name))
     assert parameters(found) == parameters(plain)
@@ -75,25 +75,16 @@ def test_another_spelling_of_the_units_changes_no_number(tmp_path: Path, plain: 
     assert machines[0].notes == machines[1].notes
 
 
-def test_a_torque_that_is_not_in_newton_metres_has_an_unknown_gain(tmp_path: Path) -> None:
-    found = tracked(tmp_path, " [rad/s]", " [mNm]")
-    assert found.kinds == PlantKinds("velocity", "torque", 1e-3)
-    assert {row[0] for row in parameters(found)} == {"two-mass-gain"}
-
-
-def test_an_output_in_rpm_has_an_unknown_gain_and_no_inertia_in_kilograms(tmp_path: Path) -> None:
-    found = tracked(tmp_path, " [rpm]", " [N m]")
-    assert found.kinds.output_factor == pytest.approx(2 * np.pi / 60)
-    assert {row[0] for row in parameters(found)} == {"two-mass-gain"}
-    with refused(ConfigError, "unit-not-si", key="fit.model", value="two-mass"):
-        tracked(tmp_path / "named", " [rpm]", " [N m]", model="two-mass")
-
-
 def test_declared_kinds_win_over_units_that_say_something_else_or_nothing(tmp_path: Path, plain: RunRecord) -> None:
     declared = {"kinds": {"y": "velocity", "u": "torque"}}
+    for name, y, u in (("counts", "counts", "%"), ("wrong", "m", "A"), ("none", "", "")):
+        found = tracked(tmp_path / name, y and f" [{y}]", u and f" [{u}]", source=declared)
+        assert found.kinds == PlantKinds("velocity", "torque", y, u)
+        assert {row[0] for row in parameters(found)} == {"two-mass-gain"}  # one of these units is not known in SI units
+    stated = {"units": {"y": "rad/s", "u": "N m"}}
     for name, y, u in (("counts", " [counts]", " [%]"), ("wrong", " [m]", " [A]"), ("none", "", "")):
-        found = tracked(tmp_path / name, y, u, source=declared)
-        assert found.kinds == PlantKinds("velocity", "torque")
+        found = tracked(tmp_path / f"stated {name}", y, u, source=stated)
+        assert found.kinds == plain.kinds
         assert parameters(found) == parameters(plain)
 
 
@@ -104,7 +95,7 @@ def test_an_unknown_kind_of_the_output_names_the_key_before_anything_is_written(
     with refused(ConfigError, "kind-needed", value="acceleration"):
         tracked(tmp_path, " [rad/s²]", " [N m]")
     named = tracked(tmp_path, " [counts]", " [N m]", output="velocity")
-    assert {row[0] for row in parameters(named)} == {"two-mass"}
+    assert {row[0] for row in parameters(named)} == {"two-mass-gain"}
     with refused(ConfigError, "kind-needed", key="measured.output", value="other"):
         MeasuredAxis(MeasuredSection(run=named.path), LOOP).machine()
     noted = MeasuredAxis(MeasuredSection(run=named.path, output="velocity"), LOOP).machine().notes
@@ -172,7 +163,7 @@ def test_a_run_without_recorded_kinds_is_read_by_its_unit(plain: RunRecord) -> N
     older = json.loads((plain.path / RUN).read_text())
     del older["found"]["kinds"]
     (plain.path / RUN).write_bytes(to_document({name: part for name, part in older.items() if name != "crc32"}))
-    assert RunRecord.open(plain.path).kinds == PlantKinds("velocity", "torque")
+    assert RunRecord.open(plain.path).kinds == PlantKinds("velocity", "torque", "rad/s", "N m")
     assert fit_run(plain.path, FitSection())[0].asked.name == "two-mass"
 
 
@@ -181,5 +172,5 @@ def test_spectra_of_a_drive_carry_the_declared_kind() -> None:
     sums = np.ones((2, 1, len(LINES)), dtype=np.complex128)
     batch = SpectraBatch(0, sums, np.zeros((1, 1)), np.zeros(1, dtype=np.uint32), layout, 1000.0)
     assert [channel.kind for channel in batch.channels] == ["current", "other"]
-    block = batch.with_kinds({"y": "velocity"}).block(0, 0, False)
+    block = batch.in_si(Quantities({"y": "velocity"})).block(0, 0, False)
     assert [(channel.name, channel.kind) for channel in block.channels] == [("u", "current"), ("y", "velocity")]

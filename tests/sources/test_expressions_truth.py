@@ -51,7 +51,8 @@ def slope(x: np.ndarray) -> np.ndarray:
         ("n*angle", C * C, "", "other"),
         ("a*b", A * B, "m m", "other"),
         ("1/a", 1 / A, "1/(m)", "other"),
-        ("0.001*`enc 1` [m]", 0.001 * A, "m", "position"),
+        ("2*`enc 1`", 2 * (A * 1e-3), "m", "position"),
+        ("2*a [mm]", 2 * A * 1e-3, "m", "position"),
         ("-s.v", -B, "", "other"),
         ("+a - -3e2", A + 300, "m", "position"),
         ("a-b", A + 7, "", "other"),  # a column of this name

@@ -133,10 +133,11 @@ def test_the_table_of_an_instrument_has_its_names_units_rate_and_all_samples(
     path.write_bytes((head + rows(line)).replace("\n", end).encode())
     log = open_log(path)
     assert log.rate_hz == RATE_HZ
-    found = {channel.name: channel.unit for channel in log.channels}
+    found = {channel.name: channel.source_unit for channel in log.channels}
     assert units.items() <= found.items()
     data = np.concatenate([block.data for block in log.blocks(list(units))], axis=1)
-    np.testing.assert_allclose(data, [A, B][: len(units)], atol=1e-9)
+    factors = [[channel.factor] for channel in log.channels if channel.name in units]
+    np.testing.assert_allclose(data / factors, [A, B][: len(units)], atol=1e-9)
 
 
 def test_a_column_without_a_name_that_rises_evenly_is_offered_as_the_time_and_the_offer_works(tmp_path: Path) -> None:

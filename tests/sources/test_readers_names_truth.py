@@ -72,7 +72,7 @@ def test_a_run_accepts_each_name_of_its_output(module, tmp_path):
     for at, output in enumerate(outputs):
         found = tracked(path, tmp_path / str(at), output, inputs[at])
         assert found.summary["configuration"]["signals"]["output"] == output
-        assert found.summary["found"]["unit"] == ("" if module in (*OWN_UNITS, *NAMES) else "rpm/(A)")
+        assert found.summary["found"]["unit"] == ("" if module in (*OWN_UNITS, *NAMES) else "rad/s/(A)")
 
 
 @pytest.mark.parametrize("version", ["v5", "v7.3"])

@@ -59,7 +59,7 @@ def test_names_that_a_person_gave_are_shown_with_their_units(tmp_path, names, ch
         element["Name"], element["Unit"] = name, ""
     scipy.io.savemat(tmp_path / "rec.mat", given)
     log = open_log(tmp_path / "rec.mat")
-    assert [(c.name, c.unit) for c in log.channels][1:] == channels
+    assert [(c.name, c.source_unit) for c in log.channels][1:] == channels
     for at, name in enumerate(names, start=1):
         for other in filter(None, [name, f"rec.Y({at}).Data", channels[at - 1][0]]):
             np.testing.assert_array_equal(values(log, other), np.arange(100) / 4000 * (at + 1))
@@ -141,7 +141,7 @@ def test_groups_attributes_and_lengths_in_hdf5(tmp_path):
         drive["z"] = np.arange(1000) * 1j
     log = open_log(tmp_path / "a.h5")
     assert (log.rate_hz, log.samples) == (2500, 1000)
-    assert [(c.name, c.unit) for c in log.channels] == [("axis/drive/speed", "rad/s"), ("axis/drive/torque", "Nm")]
+    assert [(c.name, c.unit) for c in log.channels] == [("axis/drive/speed", "rad/s"), ("axis/drive/torque", "N m")]
     assert log.scalars["axis/drive/gain"] == 3.5
     reasons = {skipped.name.rpartition("/")[2]: skipped.reason for skipped in log.skipped}
     assert reasons["period"] == "it has 100 samples, not 1000"

@@ -160,4 +160,4 @@ def test_a_final_ctrl_z_ends_the_last_number(tmp_path):
 def test_brackets_inside_the_brackets_of_a_unit(tmp_path):
     for header in ("t [s];a [m/(s^2)];x (N (rms));y [m/[s]]\n", "t;a;x;y\n[s];[m/(s^2)];(N (rms));[m/[s]]\n"):
         log = opened(tmp_path, header + "0;1;2;3\n0,5;2;3;4\n")
-        assert names(log) == [("t", "s"), ("a", "m/(s^2)"), ("x", "N (rms)"), ("y", "m/[s]")]
+        assert names(log) == [("t", "s"), ("a", "m/s²"), ("x", "N (rms)"), ("y", "m/[s]")]

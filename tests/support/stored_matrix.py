@@ -18,7 +18,7 @@ from tests.support.stored import digest
 LINES = Lines.parse("40,100", 400.0, 20)
 NAMES = ("u1", "u2", "y1", "y2")
 ARRAYS = ("value", "noise", "spread", "dof", "coherence", "condition", "reason", "first", "sample", "time_s")
-_KIND = {"output": "velocity", "input": "torque", "input_factor": 1.0, "output_factor": 1.0}
+_KIND = {"output": "velocity", "input": "torque", "output_unit": "rad/s", "input_unit": "N m"}
 
 
 def matrices() -> MatrixResponses:

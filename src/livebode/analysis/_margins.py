@@ -8,7 +8,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.arrays import Floats
-from livebode.core import OK, Loop, Parameters, Responses, RowArrays, UsageError, counted, half_width
+from livebode.core import (
+    CIRCLE_FACTOR,
+    COVERAGE,
+    OK,
+    Loop,
+    Parameters,
+    Responses,
+    RowArrays,
+    UsageError,
+    counted,
+    half_width,
+)
 from livebode.language import Message
 
 MARGIN_WORDS = {
@@ -95,7 +106,7 @@ class Margins(RowArrays):
             )
         return MARGIN_NAMES.index(name)
 
-    def bound(self, probability: float = 0.95) -> Floats:
+    def bound(self, probability: float = COVERAGE) -> Floats:
         """Half-width of the interval that covers the truth with this probability, shape (rows, margins).
 
         Raises
@@ -183,7 +194,9 @@ def against_lines(margins: Margins, responses: Responses, loop: Loop) -> Margins
     return replace(margins, **kept, status=status, place=np.where(wrong[:, np.newaxis], NONE, margins.place))
 
 
-def peak_sensitivity_at_lines(responses: Responses, loop: Loop, c: float = 2.0) -> tuple[Floats, Floats, Floats]:
+def peak_sensitivity_at_lines(
+    responses: Responses, loop: Loop, c: float = CIRCLE_FACTOR
+) -> tuple[Floats, Floats, Floats]:
     """The largest |S| at a valid line: a lower bound for Ms, the only margin that lines give without a model.
 
     Between lines a loop can come nearer to −1 unnoticed, so no crossing is read from them.
@@ -195,7 +208,7 @@ def peak_sensitivity_at_lines(responses: Responses, loop: Loop, c: float = 2.0) 
     loop
         The loop with its feedback.
     c
-        For the bound: the truth at that line is in it with probability 1 − exp(−c²).
+        For the bound: the truth at that line is in it with probability 1 − exp(−c²); default: 95 %.
 
     Returns
     -------
@@ -210,7 +223,7 @@ def peak_sensitivity_at_lines(responses: Responses, loop: Loop, c: float = 2.0) 
     >>> measured = Responses(lines, value, 0.01 * ones, row + np.inf, ones, ones > 0, row, row, row + 0.0, row + 0.0)
     >>> found = peak_sensitivity_at_lines(measured, Loop(feedback=PID(gain=1.0, rate_hz=4000)))
     >>> [x.round(3).item() for x in found]
-    [2.0, 0.08, 40.0]
+    [2.0, 0.069, 40.0]
     """
     f = responses.lines.frequency_hz
     behind = loop.feedback_at(f)

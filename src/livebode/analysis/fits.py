@@ -10,8 +10,15 @@ from typing import Any
 import numpy as np
 
 from livebode.analysis._averaged import RunMean, averaged
-from livebode.configuration import FitSection, chosen_model, fit_settings, fitter_of, recorded_configuration
-from livebode.core import Parameters, Responses, TuneError, UsageError, read_unit, split_plant_unit
+from livebode.configuration import (
+    FitSection,
+    chosen_model,
+    fit_settings,
+    fitter_of,
+    recorded_configuration,
+    unknown_gain,
+)
+from livebode.core import Parameters, Responses, TuneError, UsageError, read_unit
 from livebode.export import LpvModel
 from livebode.fitting import (
     Chain,
@@ -44,7 +51,7 @@ def fit_run(directory: Path, section: FitSection, entry: str | None = None) -> t
 def fit_averaged(of: RunMean, section: FitSection) -> tuple[Fit, str]:
     """Model fitted to the average of a run, and its sentence."""
     words = of.words
-    if not of.response.unit:
+    if not of.response.unit and section.model not in ("auto", "two-mass-gain"):
         words = Message("{mean}; the run has no units: N m, and rad/s or rad are assumed", mean=words)
     return _best(of, section), words
 
@@ -85,18 +92,21 @@ def fit_remarks(of: RunMean, section: FitSection, fitted: Fit, output: str, *, l
 
     `output` is the name of its channel, and `live` whether the run is on a live source, which computes no channels.
     """
-    unit = split_plant_unit(of.response.unit)[0]
+    unit = of.kinds.output_unit
     if section.output != "auto":
         taken: str = section.output
         why = "as fit.output specifies"
     elif of.kinds.output is not None:
         taken = "velocity" if of.kinds.output == "velocity" else "position"
-        why = f"by its unit {unit}" if read_unit(unit).kind == of.kinds.output else "as source.kinds declares"
+        by_unit = read_unit(unit).kind == of.kinds.output
+        why = f"by its unit {unit}" if by_unit else "by its name or as source.kinds declares"
     else:
         taken = _taken(fitted)
         why = "because neither a unit nor a kind is known"
         why = f"which has the smaller misfit, {why}" if fitted.status == "ok" else why
     remarks = [f"the output {output!r} is fitted as a {taken}, {why}"]
+    if reason := unknown_gain(section, of.kinds):
+        remarks.append(reason)
     if fitted.status != "ok":
         turned = replace(of, response=replace(of.response, value=-of.response.value))
         other = fit_averaged(turned, section)[0]

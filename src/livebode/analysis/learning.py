@@ -327,7 +327,7 @@ def _torque(
                 output=signals.output,
                 kind=kinds.output,
                 lines_hz=runs[0].lines.frequency_hz,
-                turn=axes[0].orders.turn or 2 * pi / kinds.output_factor,
+                turn=axes[0].orders.turn or 2 * pi,
                 shafts=_shafts(axes[0], kinds),
             ),
             "",

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from livebode.arrays import Floats
-from livebode.core import OK, Event
+from livebode.core import INTERVAL_FACTOR, OK, Event
 from livebode.records import RunRecord
 from livebode.tables import Table
 
@@ -19,7 +19,6 @@ MARGINS = "margins"
 """Model of the rows of a record that are margins."""
 ALARMS = ("change", "change-corrected", "baseline-unknown")
 """Kinds of the events that are alarms of the monitoring."""
-_BOUND_95 = 1.959964
 _ALARMS_MAX, _ROWS_MAX, _ROWS_SHOWN = 50, 2048, 120
 _NEWEST_BYTES = 64 << 20
 
@@ -85,7 +84,7 @@ class QuantityRows:
         middle = float(np.median(value))
         row = int(np.argmin(np.abs(value - middle)))
         low, high = (float(x) for x in np.quantile(value, (0.05, 0.95)))
-        bound = _BOUND_95 * float(np.median(sigma))
+        bound = INTERVAL_FACTOR * float(np.median(sigma))
         return TrendPoint(
             self.model, self.name, self.unit, middle, bound, low, high, float(time_s[row]), self._seen
         )  # fmt: skip
@@ -94,7 +93,7 @@ class QuantityRows:
         """Times, values and 95 % bounds of at most 120 of them."""
         rows = self.rows
         time_s, value, sigma = rows[:: max(1, -(-len(rows) // _ROWS_SHOWN))].T
-        return time_s, value, _BOUND_95 * sigma
+        return time_s, value, INTERVAL_FACTOR * sigma
 
 
 class FittedQuantities:

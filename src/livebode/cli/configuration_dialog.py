@@ -4,20 +4,23 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from livebode.cli import terminal
+from livebode.cli.live_survey import is_live
 from livebode.cli.shell import command_line
-from livebode.core import OutputError, UsageError, write_whole, writing
-from livebode.locations import Location, Url, location
+from livebode.core import LivebodeError, OutputError, RecordingError, SourceError, UsageError, write_whole, writing
+from livebode.locations import Location, Url, local_copy, location
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from livebode.preparation import Proposals
+    from livebode.preparation import Guess, Proposals, Recorded, Settled
+    from livebode.sources import Log
 
 _NONE = "-"
 _QUESTIONS = {
@@ -27,7 +30,8 @@ _QUESTIONS = {
     "schedule": "Schedule, what the response depends on, such as the position",
 }
 _ESTIMATORS = ("joint", "direct", "lpm", "welch")
-_MODELS = ("none", "auto", "rigid", "two-mass", "three-mass")
+_CONCERNS = {"tracking.estimator": "estimator", "fit.model": "fit", "model": "fit"}
+_WITHOUT_RATE = "recording.rate-missing"
 
 
 def write_configuration(
@@ -47,47 +51,187 @@ def write_configuration(
 ) -> None:
     """Write the configuration of a recording: list its channels, propose their roles, ask, and find lines and window.
 
-    What is given is not asked for; "-" is no channel.
+    What is given is not asked for; "-" is no channel. An answer that the recording contradicts is asked for again.
     """
-    from livebode.preparation import Proposals, settled, suitable_estimator
+    from livebode.preparation import Proposals
     from livebode.records import to_json
-    from livebode.sources import open_log
+
+    recording: Recorded
+    source: dict[str, Any]
 
     asks = not (yes or as_json)
     _check_replaceable(out, force)
-    place = location(log)
-    recording = open_log(place, rate_hz=rate, time=time, dbc=dbc)
-    if asks:
-        _check_terminal()
-    recording.naming([name for name in given.values() if name and name != _NONE])
     console = terminal.console(markup=False) if asks else None
+    if is_live(log):
+        if asks:
+            _check_terminal()
+        recording, source = _heard(log, rate)
+        title = log
+    else:
+        place = location(log)
+        if asks:
+            _check_recording(place)
+            _check_terminal()
+        recording, rate = _opened(place, rate, time, dbc, console)
+        title = place.name
+        source = {"log": _relative(place, out), "rate_hz": rate, "time": time, "dbc": dbc and _relative(dbc, out)}
+    recording.naming([name for name in given.values() if name and name != _NONE])
     proposals = Proposals(recording)
     if console is not None:
         _list(proposals, console)
-    signals, reasons = _roles(proposals, given, console)
-    suits, why = suitable_estimator(recording, signals)
-    chosen = estimator or _ask(console, f"Estimator ({why})", suits, _ESTIMATORS)
-    still = "schedule" not in signals
-    averages = average if average is not None else _agrees(console, "Average over all periods, for a standstill", still)
-    model = fit or _ask(console, "Model to fit to the responses", "none", _MODELS)
-    source = {"log": _relative(place, out), "rate_hz": rate, "time": time, "dbc": dbc and _relative(dbc, out)}
-    tables: dict[str, dict[str, Any]] = {
-        "source": {key: value for key, value in source.items() if value is not None},
-        "signals": signals,
-        "tracking": {"estimator": chosen} | ({"average": True} if averages and chosen not in ("lpm", "welch") else {}),
-    }
-    result = settled(recording, tables | ({} if model == "none" else {"fit": {"model": model}}), reasons)
+    known = given | {"estimator": estimator, "average": average, "fit": fit}
+    dialog = Dialog(proposals, {key: value for key, value in known.items() if value is not None}, console)
+    result = dialog.settled(source)
     for doubt in result.doubts:
         print(f"livebode: {doubt}", file=sys.stderr)
     with writing(out):
         out.parent.mkdir(parents=True, exist_ok=True)
-        write_whole(out, result.text(place.name).encode())
+        write_whole(out, result.text(title).encode())
     if as_json:
         print(to_json({"file": str(out), "configuration": result.tables}))
         return
     if console is None:
-        print("".join(f"{role}: {name} ({reasons[role]})\n" for role, name in signals.items()), end="")
+        reasons = ((role, name, result.comments["signals", role]) for role, name in result.tables["signals"].items())
+        print("".join(f"{role}: {name} ({reason})\n" for role, name, reason in reasons), end="")
     print(f"{out}\nTrack it: {command_line('livebode', 'run', str(out))}")
+
+
+def _heard(url: str, rate: float | None) -> tuple[Recorded, dict[str, Any]]:
+    """What came from a live source, and its section [source]."""
+    from livebode.sources.live import HeardSamples, survey
+
+    heard = survey(url)
+    if heard.block is None:
+        raise SourceError(
+            "no-samples",
+            heard.trouble or "the channels have no samples in common",
+            f"see what arrives: {command_line('livebode', 'inspect', url)}",
+            address=url,
+        ).at(url)
+    block = heard.block if rate is None else replace(heard.block, rate_hz=rate)
+    return HeardSamples(block, url), {**heard.source, "rate_hz": block.rate_hz}
+
+
+def _check_recording(place: Location) -> None:
+    """The error of a file that is missing or no recording, which nobody can answer."""
+    from livebode.sources import read_head
+
+    with local_copy(place) as path:
+        read_head(path)
+
+
+def _opened(
+    place: Location, rate: float | None, time: str | None, dbc: Path | None, console: Console | None
+) -> tuple[Log, float | None]:
+    """The recording and the rate that its configuration needs, which is asked for where the recording has none."""
+    from livebode.sources import open_log
+
+    try:
+        return open_log(place, rate_hz=rate, time=time, dbc=dbc), rate
+    except RecordingError as error:
+        if console is None or rate is not None or error.code != _WITHOUT_RATE:
+            raise
+        console.print(str(error.message), soft_wrap=True)
+    from rich.prompt import FloatPrompt
+
+    with _ended_input():
+        while (rate := FloatPrompt.ask("Rate, samples per second", console=console)) <= 0:
+            console.print(f"{rate:g} is not a positive number")
+    return open_log(place, rate_hz=rate, time=time, dbc=dbc), rate
+
+
+class Dialog:
+    """Questions for what a configuration needs; an answer that is wrong is asked for again, the others are retained.
+
+    Parameters
+    ----------
+    proposals
+        Proposals of the recording.
+    given
+        Answers that are known: channels of roles ("-" for none), "estimator", "average" and "fit".
+    console
+        Where to ask; None takes every proposal.
+    """
+
+    def __init__(self, proposals: Proposals, given: Mapping[str, Any], console: Console | None) -> None:
+        self._proposals, self._console = proposals, console
+        self._given, self._answers = given, dict(given)
+        self._reasons = dict.fromkeys(_QUESTIONS, "as specified")
+
+    def settled(self, source: Mapping[str, Any]) -> Settled:
+        """The checked configuration of all answers with this section [source].
+
+        Raises
+        ------
+        LivebodeError
+            If the recording contradicts what was given, or without a console a proposal.
+        """
+        from livebode.preparation import settled
+
+        while True:
+            try:
+                signals, reasons = self._signals()
+                return settled(self._proposals.log, self._tables(source, signals), reasons)
+            except LivebodeError as error:
+                wrong = [key for key in _concerned(error, self._answers) if key not in self._given]
+                if self._console is None or not wrong:
+                    raise
+                self._console.print(f"{error}", style="yellow", soft_wrap=True)
+                for key in wrong:
+                    self._answers.pop(key, None)
+
+    def _signals(self) -> tuple[dict[str, str], dict[str, str]]:
+        """The channel of each role, and the reason."""
+        names = [channel.name for channel in self._proposals.channels]
+        numbers = {str(number): name for number, name in enumerate(names, 1)}
+        for role, question in _QUESTIONS.items():
+            if role in self._answers:
+                continue
+            known = {key: _channel(name) for key, name in self._answers.items() if key in _QUESTIONS}
+            guess = self._proposals.roles(known)[role]
+            answer = _ask(
+                self._console, question + _hint(guess), guess.channel or _NONE, (*names, *numbers, _NONE), shown=False
+            )
+            self._answers[role] = name = answer if answer in names else numbers.get(answer, answer)
+            self._reasons[role] = guess.reason if name == guess.channel else "as specified"
+        signals = {role: name for role in _QUESTIONS if (name := _channel(self._answers[role]))}
+        _check_signals(signals, names, str(self._proposals.log.path))
+        return signals, {role: self._reasons[role] for role in signals}
+
+    def _tables(self, source: Mapping[str, Any], signals: dict[str, str]) -> dict[str, dict[str, Any]]:
+        from livebode.plugins import named
+        from livebode.preparation import suitable_estimator, tables_of
+
+        answers, console = self._answers, self._console
+        if "estimator" not in answers:
+            suits, why = suitable_estimator(self._proposals.log, signals)
+            answers["estimator"] = _ask(console, f"Estimator ({why})", suits, _ESTIMATORS)
+        if "average" not in answers:
+            still = "schedule" not in signals
+            answers["average"] = _agrees(console, "Average over all periods, for a standstill", still)
+        if "fit" not in answers:
+            answers["fit"] = _ask(console, "Model to fit to the responses", "none", ("none", "auto", *named("models")))
+        estimator, average, model = (answers[key] for key in ("estimator", "average", "fit"))
+        return tables_of(source, signals, estimator=estimator, average=average, model=model)
+
+
+def _channel(name: str | None) -> str | None:
+    return None if name == _NONE else name
+
+
+def _hint(guess: Guess) -> str:
+    others = f"; {', '.join(guess.others)} also possible" if guess.others else ""
+    return f" ({guess.channel}: {guess.reason}{others})" if guess.channel else ""
+
+
+def _concerned(error: LivebodeError, answers: Mapping[str, Any]) -> list[str]:
+    """The answers that an error is about, by its facts."""
+    facts = error.facts
+    channels = {facts.get("channel"), *facts.get("channels", ())}
+    keys = {facts.get("argument"), facts.get("key"), *facts.get("roles", ())}
+    keys |= {str(option).removeprefix("--") for option in facts.get("options", ())}
+    keys |= {_CONCERNS.get(str(key)) for key in keys}
+    return [key for key, value in answers.items() if key in keys or (key in _QUESTIONS and value in channels)]
 
 
 def _check_replaceable(out: Path, force: bool) -> None:
@@ -125,24 +269,8 @@ def _list(proposals: Proposals, console: Console) -> None:
     console.print(f"Answer with a number, a name, or {_NONE} for none; Enter takes the proposal in brackets.")
 
 
-def _roles(
-    proposals: Proposals, given: dict[str, str | None], console: Console | None
-) -> tuple[dict[str, str], dict[str, str]]:
-    """The channel of each role, and the reason."""
-    signals: dict[str, str] = {}
-    reasons: dict[str, str] = {}
-    names = [channel.name for channel in proposals.channels]
-    numbers = {str(number): name for number, name in enumerate(names, 1)}
-    for role, question in _QUESTIONS.items():
-        name, reason = given[role], "as specified"
-        if name is None:
-            guess = proposals.of(role, list(signals.values()))
-            hint = f" ({guess.channel}: {guess.reason})" if guess.channel else ""
-            answer = _ask(console, question + hint, guess.channel or _NONE, (*names, *numbers, _NONE))
-            name = numbers.get(answer, answer) if answer not in names else answer
-            reason = guess.reason if name == guess.channel else reason
-        if name != _NONE:
-            signals[role], reasons[role] = name, reason
+def _check_signals(signals: Mapping[str, str], names: Sequence[str], path: str) -> None:
+    """UsageError if the roles do not suffice."""
     if "output" not in signals:
         raise UsageError(
             "missing",
@@ -150,7 +278,7 @@ def _roles(
             "give --output CHANNEL",
             argument="output",
         )
-    alone = command_line("livebode", "run", str(proposals.log.path), "--output-only", "--output", signals["output"])
+    alone = command_line("livebode", "run", path, "--output-only", "--output", signals["output"])
     if not {"excitation", "input"} & set(signals):
         raise UsageError(
             "missing",
@@ -165,19 +293,17 @@ def _roles(
             "give --input CHANNEL",
             argument="input",
         )
-    return signals, reasons
 
 
-def _ask(console: Console | None, question: str, default: str, choices: tuple[str, ...]) -> str:
+def _ask(console: Console | None, question: str, default: str, choices: tuple[str, ...], *, shown: bool = True) -> str:
     """The answer; without a console the default."""
     if console is None:
         return default
     from rich.prompt import Prompt
     from rich.text import Text
 
-    few = len(choices) <= max(len(_ESTIMATORS), len(_MODELS))
     with _ended_input():
-        return Prompt.ask(Text(question), console=console, choices=list(choices), show_choices=few, default=default)
+        return Prompt.ask(Text(question), console=console, choices=list(choices), show_choices=shown, default=default)
 
 
 def _agrees(console: Console | None, question: str, default: bool) -> bool:

@@ -51,7 +51,7 @@ class _StderrHandler(logging.StreamHandler):  # type: ignore[type-arg]
 
 
 class _FileHandler(RotatingFileHandler):
-    """A file of bounded size. A disk that takes no line costs the line, and one sentence on standard error."""
+    """A file of bounded size. Lines that cannot be written are lost; standard error gets one sentence about it."""
 
     _failed = False
 

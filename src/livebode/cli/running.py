@@ -6,6 +6,7 @@ import gc
 import os
 import re
 import signal
+import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import replace
@@ -17,16 +18,17 @@ import typer
 
 from livebode.cli import terminal
 from livebode.cli.failures import exit_code_of
-from livebode.cli.notices import NoticePrinter
+from livebode.cli.notices import NoticePrinter, PercentPrinter
 from livebode.cli.options import parsed_band
 from livebode.cli.pictures import draw, load_beside, tell_how_to_draw, tracked_amount
 from livebode.cli.remote import recorded_at
+from livebode.cli.shell import command_line
 from livebode.configuration import Axes, Axis, ConfigurationFile, ServeSection
 from livebode.core import ConfigError, LocationError, RecordError, UsageError
 from livebode.estimates import rule
 from livebode.locations import Location, Url, local_copy, location, original
 from livebode.records import check_removable, is_run, to_json
-from livebode.runtime import Destination, Document, Outcome, StoppedError, Subscriber, TrackerResults, run
+from livebode.runtime import Destination, Document, Outcome, StoppedError, Subscriber, TrackerResults, next_run, run
 from livebode.sources import read_head
 
 if TYPE_CHECKING:
@@ -71,8 +73,12 @@ def run_targets(
     axes: Axes = _axes(places, over, each) if file is None else file.read()
     live = any(axis.source.live for axis in axes.values())
     alone = axes.get("")
-    place = Path("runs") / target.stem if out is None else location(out)
     segments = live or any(axis.record is not None for axis in axes.values())
+    place: Location = Path("runs") / target.stem
+    if out is not None:
+        place = location(out)
+    elif not force and (live or not segments):  # the record of a recording with a journal continues
+        place = next_run(Path("runs") / target.stem, axes)
     with recorded_at(place, segments=segments) as (directory, send):
         if alone is None:
             _check_places(directory, axes, force=force)
@@ -206,19 +212,54 @@ def _axes(recordings: list[Location], specified: dict[str, dict[str, Any]], outp
 
 
 def _axis(recordings: list[Location], specified: dict[str, dict[str, Any]]) -> Axis:
-    """The configuration of recordings from the options."""
-    if "output" not in specified.get("signals", {}):
+    """The configuration of recordings from the options; roles are proposed where no channel is named."""
+    source, signals = specified.get("source", {}), specified.get("signals", {})
+    if not signals.keys() & {"excitation", "input", "output"} and "output_only" not in specified:
+        signals, tracking = _proposed_roles(recordings[0], source)
+        specified = specified | {
+            "signals": specified.get("signals", {}) | signals,
+            "tracking": tracking | specified.get("tracking", {}),
+        }
+    if "output" not in signals:
         for recording in recordings:
             with local_copy(recording) as path:
                 read_head(path)  # a file that is missing or a directory is the first thing to mend
-        raise UsageError(
-            "missing",
-            "the output channel is not named",
-            "give --output CHANNEL (livebode inspect lists the channels, with --out axis.toml it proposes their roles)",
-            argument="output",
-        )
+        raise _output_missing(recordings[0], "the output channel is not named")
     log = recordings if len(recordings) > 1 else recordings[0]
-    return Axis.of(specified | {"source": specified.get("source", {}) | {"log": log}}, "the options")
+    return Axis.of(specified | {"source": source | {"log": log}}, "the options")
+
+
+def _output_missing(recording: Location, wrong: str) -> UsageError:
+    words = command_line("livebode", "inspect", str(recording), "--out", "axis.toml")
+    return UsageError(
+        "missing", wrong, f"give --output CHANNEL; `{words}` lists the channels and proposes their roles",
+        argument="output",
+    )  # fmt: skip
+
+
+def _proposed_roles(recording: Location, source: Mapping[str, Any]) -> tuple[dict[str, str], dict[str, str]]:
+    """[signals] and [tracking] of a recording whose channels have unambiguous roles, which are printed.
+
+    UsageError if a role could be that of several channels, or of none.
+    """
+    from livebode.preparation import Proposals, suitable_estimator
+    from livebode.sources import open_log
+
+    log = open_log(recording, rate_hz=source.get("rate_hz"), time=source.get("time"), dbc=source.get("dbc"))
+    roles = Proposals(log).roles()
+    roles.pop("schedule")
+    if missing := [role for role in ("input", "output") if roles[role].channel is None]:
+        names = ", ".join(channel.name for channel in log.channels)
+        raise _output_missing(recording, f"no channel is named, and the {missing[0]} is not recognised among {names}")
+    if doubtful := {role: guess for role, guess in roles.items() if guess.others}:
+        role, guess = next(iter(doubtful.items()))
+        suitable = " or ".join(map(repr, (guess.channel, *guess.others)))
+        raise _output_missing(recording, f"no channel is named, and the {role} could be {suitable}")
+    signals = {role: guess.channel for role, guess in roles.items() if guess.channel is not None}
+    estimator, _ = suitable_estimator(log, signals)
+    reasons = ", ".join(f"{role} {name} ({roles[role].reason})" for role, name in signals.items())
+    print(f"livebode: roles: {reasons}; --output, --input and --excitation change them", file=sys.stderr)
+    return signals, {"estimator": estimator}
 
 
 def _run(
@@ -241,7 +282,8 @@ def _run(
 def _with_progress(job: Callable[[tuple[Subscriber, ...]], Outcome], quiet: bool) -> Outcome:
     """Run a job whose subscribers show notices and, on a terminal, a progress bar."""
     if quiet or not terminal.is_terminal(stderr=True):
-        return job((NoticePrinter(lambda message: _print_notice(terminal.console(stderr=True), message)),))
+        notices = NoticePrinter(lambda message: _print_notice(terminal.console(stderr=True), message))
+        return job((notices, PercentPrinter()) if terminal.prints_percent else (notices,))
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
     columns = (

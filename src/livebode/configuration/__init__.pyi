@@ -17,6 +17,7 @@ from livebode.configuration.fit_section import check_model as check_model
 from livebode.configuration.fit_section import chosen_model as chosen_model
 from livebode.configuration.fit_section import fit_settings as fit_settings
 from livebode.configuration.fit_section import fitter_of as fitter_of
+from livebode.configuration.fit_section import unknown_gain as unknown_gain
 from livebode.configuration.loop_section import ControllerSection as ControllerSection
 from livebode.configuration.loop_section import LoopSection as LoopSection
 from livebode.configuration.loop_section import PIDSection as PIDSection

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+import re
+from collections.abc import Iterator, Sequence
+from typing import Annotated, Any, Literal, NamedTuple
 
 from pydantic import Field
 
 from livebode import fitting
 from livebode.configuration.section import ConfigurationSection, Positive
-from livebode.core import ConfigError, PlantKinds, UsageError
+from livebode.core import SI_UNITS, ConfigError, PlantKinds, UsageError
+from livebode.fitting.models import MODELS
+from livebode.language import Message
 from livebode.plugins import named
 
 
@@ -38,10 +42,7 @@ def check_model(name: str, *, finished: bool = True) -> None:
 
 
 def chosen_model(section: FitSection, kinds: PlantKinds) -> fitting.PhysicalModel:
-    """The section's model; "auto" is two masses if the input is a torque, else two masses with an unknown gain.
-
-    With a torque that is not in N m, or an output in rpm or degrees, the gain is unknown too: the parameters of all
-    other models are in SI units.
+    """The section's model; "auto" is two masses if their parameters are known in SI units, else with an unknown gain.
 
     Raises
     ------
@@ -49,7 +50,7 @@ def chosen_model(section: FitSection, kinds: PlantKinds) -> fitting.PhysicalMode
         If there is no such model.
     ConfigError
         If the section specifies modes or poles; if it does not specify the output, and its kind is neither a velocity
-        nor a position; or if it specifies a model in SI units and a unit is not one.
+        nor a position; or if it specifies a model in SI units and one of the units contradicts that.
     """
     name = section.model
     if name in fitting.POLE_MODELS:
@@ -62,17 +63,15 @@ def chosen_model(section: FitSection, kinds: PlantKinds) -> fitting.PhysicalMode
         )
     check_model(name, finished=False)
     if name == "auto":
-        name = "two-mass" if kinds.si and (kinds.input == "torque" or section.radius_m) else "two-mass-gain"
-    elif name != "two-mass-gain" and not kinds.si:
+        name = "two-mass-gain" if unknown_gain(section, kinds) else "two-mass"
+    elif name != "two-mass-gain" and (doubts := list(_units_not_si(name, kinds))):
         raise ConfigError(
             "unit-not-si",
-            f"the parameters of fit.model = {name!r} are in SI units, but one unit of the output is "
-            f"{kinds.output_factor:g} and one of the input {kinds.input_factor:g} SI units",
-            "set fit.model to 'two-mass-gain', or record rad/s or m/s, and N m",
+            f"the parameters of fit.model = {name!r} are in SI units, but {_why(doubts)}",
+            f"{_remedy(doubts)}, or set fit.model to 'two-mass-gain'",
             key="fit.model",
             value=name,
-            output_factor=kinds.output_factor,
-            input_factor=kinds.input_factor,
+            unit=doubts[0].unit,
         )
     output = section.output
     if output == "auto":
@@ -80,7 +79,85 @@ def chosen_model(section: FitSection, kinds: PlantKinds) -> fitting.PhysicalMode
     # The gain model is of the motor's side only: naming it is no conflict.
     side = None if name == "two-mass-gain" and section.side == "motor" else section.side
     options = {"side": side, "radius_m": section.radius_m, "inertia_ratio": section.inertia_ratio}
+    if name == "two-mass-gain":
+        options |= {"output_unit": kinds.output_unit, "input_unit": kinds.input_unit}
     return fitting.model_named(name, output=output, **options)
+
+
+class _UnitDoubt(NamedTuple):
+    """A channel whose unit does not give parameters in SI units: empty, or not that of the quantity that it is."""
+
+    name: str
+    unit: str
+    quantity: str
+
+
+_TORQUE_OF = {"%": "0.024 N m", "A": "0.35 N m"}
+_ONE_UNIT = {"torque": "0.001 N m", "position": "1/131072 rev", "velocity": "0.1 rpm"}
+_UNIT = {"torque": "N m", "position": "rad", "velocity": "rad/s"}
+
+
+def unknown_gain(section: FitSection, kinds: PlantKinds) -> str:
+    """Why "auto" is not two masses with parameters in SI units, and how to get them; empty if it is."""
+    if section.model != "auto":
+        return ""
+    doubts = [*_units_not_si("two-mass", kinds), *(_units_unknown(kinds) if section.radius_m is None else ())]
+    if not doubts and kinds.output_unit in ("m", "m/s") and not (section.radius_m and section.side == "load"):
+        why = Message("{channel} is in {unit}", channel=repr(kinds.output_name), unit=kinds.output_unit)
+        return _unknown(why, Message("set radius_m and side = 'load' in [fit]"))
+    return _unknown(_why(doubts), _remedy(doubts)) if doubts else ""
+
+
+def _unknown(why: str, remedy: str) -> str:
+    return Message(
+        "the gain is unknown, so that masses and stiffness are not fitted: {why}; {remedy}", why=why, remedy=remedy
+    )
+
+
+def _units_not_si(model: str, kinds: PlantKinds) -> Iterator[_UnitDoubt]:
+    """Of known units that are not those that the model needs."""
+    torque = model in MODELS
+    if kinds.input_unit and (kinds.input_unit != "N m" if torque else kinds.input_unit not in SI_UNITS):
+        yield _UnitDoubt(kinds.input_name, kinds.input_unit, "torque")
+    if kinds.output_unit and kinds.output_unit not in SI_UNITS:
+        yield _UnitDoubt(kinds.output_name, kinds.output_unit, _motion(kinds))
+
+
+def _units_unknown(kinds: PlantKinds) -> Iterator[_UnitDoubt]:
+    if not kinds.input_unit:
+        yield _UnitDoubt(kinds.input_name, "", "torque")
+    if not kinds.output_unit:
+        yield _UnitDoubt(kinds.output_name, "", _motion(kinds))
+
+
+def _motion(kinds: PlantKinds) -> str:
+    return "position" if kinds.output == "position" else "velocity"
+
+
+def _why(doubts: Sequence[_UnitDoubt]) -> str:
+    return Message.conjunction(
+        Message("{channel} is in {unit}", channel=repr(doubt.name), unit=doubt.unit)
+        if doubt.unit
+        else Message("the unit of {channel} is not known", channel=repr(doubt.name))
+        for doubt in doubts
+    )
+
+
+def _remedy(doubts: Sequence[_UnitDoubt]) -> str:
+    if doubts[0].unit == "N":
+        return Message("the model is driven by a torque")
+    entries = ", ".join(f'{_toml_key(doubt.name)} = "{_example(doubt)}"' for doubt in doubts)
+    return Message("state what one unit is in [source], as in {units}", units=f"units = {{ {entries} }}")
+
+
+def _example(doubt: _UnitDoubt) -> str:
+    if not doubt.unit:
+        return _UNIT[doubt.quantity]
+    return (_TORQUE_OF if doubt.quantity == "torque" else {}).get(doubt.unit, _ONE_UNIT[doubt.quantity])
+
+
+def _toml_key(name: str) -> str:
+    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else f'"{name}"'
 
 
 def _output_of(kinds: PlantKinds) -> Literal["velocity", "position"]:
@@ -111,8 +188,8 @@ class FitSection(ConfigurationSection):
     Parameters
     ----------
     model
-        The model. "auto": two-mass if the input is a torque or radius_m is given, otherwise two-mass-gain; that also
-        where a unit is recognised and not SI (rpm, mN m).
+        The model. "auto": two-mass if the input is a torque in N m and the output in rad or rad/s, as they are read,
+        or radius_m is given; otherwise two-mass-gain, and the result says why.
     output
         What the output is. "auto": by its kind, velocity if it has neither a unit nor a kind.
     side

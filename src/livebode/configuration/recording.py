@@ -8,7 +8,7 @@ from typing import Any
 from livebode.configuration.axis import Axis
 from livebode.estimates import RESPONSE
 from livebode.locations import Location
-from livebode.sources import Log, even_or_uneven_log, located, log_of, open_file, open_log
+from livebode.sources import Log, Quantities, even_or_uneven_log, located, log_of, open_file
 
 _NAMES = {
     "signals": ("outputs", "inputs", "excitations", "schedule", "ready"),
@@ -21,7 +21,7 @@ _NAMES = {
 def open_recording(axis: Axis) -> Log:
     """Open the one recording in [source] at the clock of the output; LivebodeError if it cannot be read."""
     (path,) = axis.source.logs
-    return open_log(path, **_reading(axis), dbc=axis.source.dbc, channels=axis.signals.listed("output"))
+    return log_of(open_file(path, axis.source.dbc), **_reading(axis), channels=axis.signals.listed("output"))
 
 
 def open_recordings(axis: Axis) -> tuple[Axis, list[Log]]:
@@ -74,4 +74,5 @@ def _renamed(section: Any, keys: tuple[str, ...], shared: Callable[[str], str]) 
 
 def _reading(axis: Axis) -> dict[str, Any]:
     source = axis.source
-    return {"rate_hz": source.rate_hz, "time": source.time, "kinds": source.kinds, "clock": source.clock}
+    quantities = Quantities(source.kinds, source.units)
+    return {"rate_hz": source.rate_hz, "time": source.time, "quantities": quantities, "clock": source.clock}

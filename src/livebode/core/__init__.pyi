@@ -26,8 +26,10 @@ from livebode.core._spectra import SPIKE as SPIKE
 from livebode.core._spectra import Spectra as Spectra
 from livebode.core._spectra import SpectraLayout as SpectraLayout
 from livebode.core._spectra import rms as rms
+from livebode.core._unit_reading import SI_UNITS as SI_UNITS
 from livebode.core._unit_reading import QuantityKind as QuantityKind
 from livebode.core._unit_reading import UnitReading as UnitReading
+from livebode.core._unit_reading import read_quantity as read_quantity
 from livebode.core._unit_reading import read_unit as read_unit
 from livebode.core._unit_reading import split_plant_unit as split_plant_unit
 from livebode.core._wording import counted as counted
@@ -48,6 +50,9 @@ from livebode.core.controllers import DriveTiming as DriveTiming
 from livebode.core.controllers import PositionPD as PositionPD
 from livebode.core.controllers import integral as integral
 from livebode.core.deferred_model import DeferredModel as DeferredModel
+from livebode.core.distributions import CIRCLE_FACTOR as CIRCLE_FACTOR
+from livebode.core.distributions import COVERAGE as COVERAGE
+from livebode.core.distributions import INTERVAL_FACTOR as INTERVAL_FACTOR
 from livebode.core.distributions import f_exceeded as f_exceeded
 from livebode.core.distributions import f_quantile as f_quantile
 from livebode.core.distributions import log_sum_exceeded as log_sum_exceeded
@@ -55,6 +60,7 @@ from livebode.core.distributions import normal_quantile as normal_quantile
 from livebode.core.distributions import sum_exceeded as sum_exceeded
 from livebode.core.distributions import t_quantile as t_quantile
 from livebode.core.document import TONES as TONES
+from livebode.core.document import Answer as Answer
 from livebode.core.document import Document as Document
 from livebode.core.document import Finding as Finding
 from livebode.core.document import Listing as Listing

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import inf
 
 import numpy as np
@@ -23,10 +23,15 @@ class Channel:
     name
         Its name in the source.
     unit
-        Empty where the source does not report it.
+        Unit of the samples; empty where the source does not report it. What is read has SI units (rad for angles)
+        where the unit is recognised.
     kind
         The quantity that it is: torque, force, current, velocity, position, acceleration or other. Default: the one
         that the unit shows, "other" for a unit that is not recognised.
+    written
+        Unit in the source, where it is spelled otherwise or is another one; else empty.
+    factor
+        SI units in one unit of the source: the samples are its values times this.
 
     Raises
     ------
@@ -44,6 +49,8 @@ class Channel:
     name: str
     unit: str = ""
     kind: QuantityKind = None  # type: ignore[assignment]
+    written: str = field(default="", repr=False)
+    factor: float = field(default=1.0, repr=False)
 
     def __post_init__(self) -> None:
         declared: str | None = self.kind
@@ -65,10 +72,9 @@ class Channel:
         return None if self.kind == "other" and not self.unit else self.kind
 
     @property
-    def factor(self) -> float:
-        """SI units in one unit of the channel; 1 where the unit does not show the kind."""
-        reading = read_unit(self.unit)
-        return reading.factor if reading.kind == self.kind else 1.0
+    def source_unit(self) -> str:
+        """Unit in the source, for a person who knows the machine by it: `unit` is that of the samples."""
+        return self.written or self.unit
 
 
 @dataclass(frozen=True, eq=False)
@@ -213,30 +219,29 @@ class PlantKinds:
     Attributes
     ----------
     output, input
-        None where the source reports no unit, and the configuration declares no kind.
-    input_factor, output_factor
-        SI units (rad for angles) in one unit of the input and of the output; 1 where the unit is not recognised.
+        None where the source reports no unit, and neither its name nor the configuration shows the kind.
+    output_unit, input_unit
+        Units of their samples, empty where they are not known.
+    output_name, input_name
+        Names of their channels, for messages.
 
     Examples
     --------
-    >>> PlantKinds.of(Channel("speed", "rpm"), Channel("torque", "N m"))
-    PlantKinds(output='velocity', input='torque', input_factor=1.0, output_factor=0.10471975511965977)
+    >>> PlantKinds.of(Channel("speed", "rad/s"), Channel("torque", "%"))
+    PlantKinds(output='velocity', input='other', output_unit='rad/s', input_unit='%')
     """
 
     output: QuantityKind | None = None
     input: QuantityKind | None = None
-    input_factor: float = 1.0
-    output_factor: float = 1.0
-
-    @property
-    def si(self) -> bool:
-        """Whether both are in SI units, or in units that are not recognised."""
-        return self.input_factor == self.output_factor == 1.0
+    output_unit: str = ""
+    input_unit: str = ""
+    output_name: str = field(default="output", compare=False, repr=False)
+    input_name: str = field(default="input", compare=False, repr=False)
 
     @classmethod
     def of(cls, output: Channel, input: Channel) -> PlantKinds:
         """The kinds of two channels."""
-        return cls(output.stated_kind, input.stated_kind, input.factor, output.factor)
+        return cls(output.stated_kind, input.stated_kind, output.unit, input.unit, output.name, input.name)
 
     @classmethod
     def of_unit(cls, unit: str) -> PlantKinds:

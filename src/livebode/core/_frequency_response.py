@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from livebode.arrays import Complex, Floats
+from livebode.core.distributions import CIRCLE_FACTOR
 from livebode.core.lines import Lines, position, within
 from livebode.plugins import loaded
 
@@ -123,7 +124,7 @@ measured line; the nearest are 50 and 60 Hz
         *,
         axes: Any = None,
         bounds: bool = True,
-        c: float = 2.0,
+        c: float = CIRCLE_FACTOR,
         label: str | None = None,
         color: Any = None,
     ) -> Any:
@@ -144,8 +145,8 @@ measured line; the nearest are 50 and 60 Hz
         bounds
             Whether to draw the bounds.
         c
-            Radius of the bounds in sigma: they cover the true value with probability 1 − exp(−c²), 98.2 % for 2. In the
-            Nyquist plot a bound is a circle; in the others it is the exact image of this circle.
+            Radius of the bounds in sigma: they cover the true value with probability 1 − exp(−c²); default: 95 %. In
+            the Nyquist plot a bound is a circle; in the others it is the exact image of this circle.
         label
             Name in the legend; default: the quantity.
         color
@@ -171,7 +172,7 @@ measured line; the nearest are 50 and 60 Hz
         >>> figure, axes = plt.subplots()
         >>> _ = example_responses()[-1].plot("nyquist", axes=axes, c=1)
         >>> axes.get_legend_handles_labels()[1]
-        ['plant', 'bound: 63.2 % (1σ)']
+        ['plant', 'bound: 63.2 %']
         """
         draw = loaded("livebode.pictures:plot_responses")  # a floor above: pictures need what they show
         return draw(self._batch(), kind, axes=axes, c=c if bounds else None, label=label, color=color)

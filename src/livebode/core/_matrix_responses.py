@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from livebode.arrays import Complex, Floats
 from livebode.core._conversion import matrix_dataset, matrix_frd
 from livebode.core._response import Responses, widened
+from livebode.core.distributions import CIRCLE_FACTOR
 from livebode.core.errors import GridError, UsageError
 from livebode.core.lines import Lines, ends, position, within
 from livebode.core.rows import RowArrays
@@ -129,15 +130,15 @@ class MatrixResponses(RowArrays):
         values[whole] = np.linalg.svd(self.value[whole], compute_uv=False)
         return values
 
-    def singular_value_bound(self, c: float = 2.0) -> Floats:
+    def singular_value_bound(self, c: float = CIRCLE_FACTOR) -> Floats:
         """Radius around each singular value, shape of `singular_values`.
 
         To first order an error δ moves the singular value with the vectors u and v by the real part of u*·δ·v
         (Stewart and Sun, Matrix Perturbation Theory, 1990, section IV.4). The radius is that of the complex number
         u*·δ·v, whose variance is u*·noise·u times vᵀ·spread·v̄. Its modulus is at least its real part, so the radius
-        covers the true singular value with a probability of 1 − exp(−c²) or more, also where it is zero. Biased where
-        several differ by less than their radii: they repel each other, and of three the outer ones are covered less
-        often. docs/explanation/mimo.md has the measured shares.
+        covers the true singular value with a probability of 1 − exp(−c²) or more, 95 % by default, also where it is
+        zero. Biased where several differ by less than their radii: they repel each other, and of three the outer ones
+        are covered less often. docs/explanation/mimo.md has the measured shares.
         """
         radius = np.full(self.singular_values.shape, np.nan)
         whole = self.valid.all(axis=2)
@@ -147,8 +148,8 @@ class MatrixResponses(RowArrays):
         radius[whole] = np.sqrt(np.maximum(noise * spread, 0.0))
         return widened(radius, self.dof[:, np.newaxis, np.newaxis], c)
 
-    def bound(self, c: float = 2.0) -> Floats:
-        """Radius that covers the truth with probability 1 − exp(−c²), for each entry alone, shape of `value`."""
+    def bound(self, c: float = CIRCLE_FACTOR) -> Floats:
+        """Radius that covers the truth with probability 1 − exp(−c²), 95 % by default, for each entry alone."""
         return widened(self.sigma, self.dof[:, np.newaxis, np.newaxis, np.newaxis], c)
 
     def entry(self, output: str | int, input: str | int) -> Responses:
@@ -316,7 +317,13 @@ class MatrixResponses(RowArrays):
         )
 
     def plot(
-        self, *, axes: Any = None, bounds: bool = True, c: float = 2.0, label: str | None = None, color: Any = None
+        self,
+        *,
+        axes: Any = None,
+        bounds: bool = True,
+        c: float = CIRCLE_FACTOR,
+        label: str | None = None,
+        color: Any = None,
     ) -> Any:
         """Draw each entry as a Bode plot: outputs down, inputs across, each with magnitude above phase.
 

@@ -13,6 +13,7 @@ from livebode.arrays import Floats
 from livebode.core import _conversion
 from livebode.core._frequency_response import PER_LINE, FrequencyResponse, Quantity
 from livebode.core.clock import moment
+from livebode.core.distributions import CIRCLE_FACTOR, COVERAGE
 from livebode.core.errors import GridError
 from livebode.core.lines import Lines, ends
 from livebode.core.rows import RowArrays
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 
 
 def widened(sigma: ArrayLike, dof: ArrayLike, c: float) -> Floats:
-    """Radius around an estimate that covers the truth with probability 1 − exp(−c²): 63.2 % for 1, 98.2 % for 2.
+    """Radius around an estimate that covers the truth with probability 1 − exp(−c²): 63.2 % for 1, 95 % for 1.73.
 
     A `sigma` that was itself estimated with `dof` complex degrees of freedom makes |Ĝ − G|²/sigma² follow
     F(2, 2·dof); the factor √(d(exp(c²/d) − 1)) instead of c keeps the probability. Unknown (NaN) dof gives NaN, and
@@ -88,7 +89,7 @@ class Response(FrequencyResponse):
     <Response: plant in rad/s/(N m), 13 lines, 20 … 140 Hz, all valid, at 0.95 s>
     >>> response.magnitude_db[:3].round(1), response.phase_deg[:3].round()
     (array([  2.6,  -2.9, -13.3]), array([-90., -88., -71.]))
-    >>> response.bound(2).shape, round(float(response.coherence.min()), 2)
+    >>> response.bound().shape, round(float(response.coherence.min()), 2)
     ((13,), 1.0)
     """
 
@@ -112,8 +113,8 @@ class Response(FrequencyResponse):
     def __post_init__(self) -> None:
         _fill_unknown(self)
 
-    def bound(self, c: float = 2.0) -> Floats:
-        """Radius that covers the truth with probability 1 − exp(−c²), shape (lines,); see `widened`."""
+    def bound(self, c: float = CIRCLE_FACTOR) -> Floats:
+        """Radius that covers the truth with probability 1 − exp(−c²), 95 % by default; (lines,), see `widened`."""
         return widened(self.sigma, self.dof, c)
 
     def response(self, frequency_hz: ArrayLike) -> NDArray[np.complex128]:
@@ -231,8 +232,8 @@ class Responses(RowArrays, FrequencyResponse, Sequence[Response]):
     def __iter__(self) -> Iterator[Response]:
         return (self[i] for i in range(len(self)))
 
-    def bound(self, c: float = 2.0) -> Floats:
-        """Radius that covers the truth with probability 1 − exp(−c²), shape (rows, lines)."""
+    def bound(self, c: float = CIRCLE_FACTOR) -> Floats:
+        """Radius that covers the truth with probability 1 − exp(−c²), 95 % by default, shape (rows, lines)."""
         return widened(self.sigma, self.dof[:, np.newaxis], c)
 
     def newest(self) -> Response | None:
@@ -286,7 +287,7 @@ class Responses(RowArrays, FrequencyResponse, Sequence[Response]):
 
 
 _ROWS_MAX = 24
-_HEADS = ("frequency", "magnitude", "phase", "bound (2σ, 98.2 %)", "coherence")
+_HEADS = ("frequency", "magnitude", "phase", f"bound ({100 * COVERAGE:g} %)", "coherence")
 
 
 def of_response(response: Response) -> str:
@@ -320,7 +321,7 @@ def table_of_response(response: Response) -> str:
     count = len(response.lines)
     shown = np.unique(np.linspace(0, count - 1, min(count, _ROWS_MAX)).round().astype(int))
     with np.errstate(divide="ignore", invalid="ignore"):
-        share = response.bound(2) / np.abs(response.value)
+        share = response.bound() / np.abs(response.value)
     values = (
         response.frequency_hz,
         response.magnitude_db,

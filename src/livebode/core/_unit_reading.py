@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
-from math import pi
+from math import inf, pi
 from typing import Literal, get_args
 
 QuantityKind = Literal["torque", "force", "current", "velocity", "position", "acceleration", "other"]
@@ -22,29 +22,43 @@ _SECOND: _Dimension = (0, 0, 1, 0, 0)
 _AMPERE: _Dimension = (0, 0, 0, 1, 0)
 _ANGLE: _Dimension = (0, 0, 0, 0, 1)
 _NEWTON: _Dimension = (1, 1, -2, 0, 0)
+_PER_SECOND: _Dimension = (0, 0, -1, 0, 0)
+_PER_SECOND_SQUARED: _Dimension = (0, 0, -2, 0, 0)
 
-_KIND_OF: dict[_Dimension, QuantityKind] = {
-    (2, 1, -2, 0, 0): "torque",
-    _NEWTON: "force",
-    _AMPERE: "current",
-    _METRE: "position",
-    _ANGLE: "position",
-    (1, 0, -1, 0, 0): "velocity",
-    (0, 0, -1, 0, 1): "velocity",
-    (0, 0, -1, 0, 0): "velocity",
-    (1, 0, -2, 0, 0): "acceleration",
-    (0, 0, -2, 0, 1): "acceleration",
-    (0, 0, -2, 0, 0): "acceleration",
+_KIND_OF: dict[_Dimension, tuple[QuantityKind, str]] = {
+    (2, 1, -2, 0, 0): ("torque", "N m"),
+    _NEWTON: ("force", "N"),
+    _AMPERE: ("current", "A"),
+    _METRE: ("position", "m"),
+    _ANGLE: ("position", "rad"),
+    (1, 0, -1, 0, 0): ("velocity", "m/s"),
+    (0, 0, -1, 0, 1): ("velocity", "rad/s"),
+    _PER_SECOND: ("velocity", "rad/s"),
+    (1, 0, -2, 0, 0): ("acceleration", "m/s²"),
+    (0, 0, -2, 0, 1): ("acceleration", "rad/s²"),
+    _PER_SECOND_SQUARED: ("acceleration", "rad/s²"),
 }
+"""Kind and SI unit."""
+SI_UNITS = frozenset(si for _, si in _KIND_OF.values())
 _PREFIXED = {"m": _METRE, "s": _SECOND, "A": _AMPERE, "N": _NEWTON, "rad": _ANGLE}
 _PREFIXES = {"n": 1e-9, "u": 1e-6, "μ": 1e-6, "m": 1e-3, "c": 1e-2, "d": 1e-1, "k": 1e3, "M": 1e6}
 _SYMBOLS: dict[str, tuple[float, _Dimension]] = {
     **{symbol: (1.0, dimension) for symbol, dimension in _PREFIXED.items()},
     **{p + s: (factor, dimension) for s, dimension in _PREFIXED.items() for p, factor in _PREFIXES.items()},
     **dict.fromkeys(("Arms", "Aeff", "Apk"), (1.0, _AMPERE)),
-    **dict.fromkeys(("deg", "degree", "degrees", "°"), (pi / 180, _ANGLE)),
-    **dict.fromkeys(("rev", "turn", "r", "U"), (2 * pi, _ANGLE)),
-    **dict.fromkeys(("rpm", "RPM"), (2 * pi / 60, (0, 0, -1, 0, 1))),
+    **dict.fromkeys(("deg", "degree", "degrees", "°", "Grad", "度"), (pi / 180, _ANGLE)),
+    "mdeg": (pi / 180e3, _ANGLE),
+    **dict.fromkeys(("rev", "revs", "turn", "turns", "r", "U", "Umdr", "转", "圈"), (2 * pi, _ANGLE)),
+    **dict.fromkeys(("rpm", "RPM", "Rpm", "upm", "UPM", "Upm"), (2 * pi / 60, (0, 0, -1, 0, 1))),
+    **dict.fromkeys(("rps", "RPS"), (2 * pi, (0, 0, -1, 0, 1))),
+    "弧度": (1.0, _ANGLE),
+    "米": (1.0, _METRE),
+    "毫米": (1e-3, _METRE),
+    "安": (1.0, _AMPERE),
+    "牛": (1.0, _NEWTON),
+    "牛米": (1.0, (2, 1, -2, 0, 0)),
+    "秒": (1.0, _SECOND),
+    **dict.fromkeys(("分", "分钟"), (60.0, _SECOND)),
     "kg": (1.0, (0, 1, 0, 0, 0)),
     **dict.fromkeys(("g", "gn", "G"), (9.80665, (1, 0, -2, 0, 0))),  # of accelerometers; no other kind has g
     "mg": (9.80665e-3, (1, 0, -2, 0, 0)),
@@ -55,6 +69,10 @@ _SYMBOLS: dict[str, tuple[float, _Dimension]] = {
 _TOKEN = re.compile(
     r"\s*(?:(?P<symbol>[^\W\d_]+|°)(?:(?:\^|\*\*)?(?P<exponent>[+-]?\d+|\([+-]?\d+\)))?|(?P<one>1)(?!\d)"
     r"|(?P<mark>[/()])|(?:[*·⋅∙.]|-(?!\d)))\s*"
+)
+_PER_MINUTE = re.compile(r"min|分")
+_QUANTITY = re.compile(
+    r"\s*(?P<number>\d+(?:\.\d*)?(?:[eE][+-]?\d+)?)(?:\s*/\s*(?P<divisor>\d+(?:\.\d*)?))?\s*(?P<unit>\D.*)"
 )
 _TORQUE = re.compile(r"([kMmcμu]?N)([cm]?m)")  # "Nm" is one word in most headings
 
@@ -71,25 +89,44 @@ class UnitReading:
         SI units (rad for angles) in one of this unit; 1 for a unit that is not recognised.
     rotary
         Whether it contains no length, except in a torque.
+    si
+        The SI unit of the quantity, in the spelling of livebode; empty for a unit that is not recognised.
     """
 
     kind: QuantityKind = "other"
     factor: float = 1.0
     rotary: bool = False
+    si: str = ""
 
 
 def read_unit(text: str) -> UnitReading:
     """What a unit measures, by its dimension; spellings of the same unit give the same.
 
-    Recognised are products and quotients of m, kg, s, min, h, A, N, g, rad, °, deg, rev and rpm with SI prefixes. The
-    unit 1/s is that of an angular velocity.
+    Recognised are products and quotients of m, kg, s, min, h, A, N, g, rad, °, deg, rev and rpm with SI prefixes, also
+    in German and Chinese. The unit 1/s is that of an angular velocity; 1/min are revolutions per minute.
 
     >>> [read_unit(text).kind for text in ("N m", "rad s^-1", "mm/s²", "Arms", "1/min", "counts", "")]
     ['torque', 'velocity', 'acceleration', 'current', 'velocity', 'other', 'other']
     >>> read_unit("mNm")
-    UnitReading(kind='torque', factor=0.001, rotary=True)
+    UnitReading(kind='torque', factor=0.001, rotary=True, si='N m')
+    >>> [round(read_unit(text).factor, 4) for text in ("rpm", "1/min", "min⁻¹", "U/min", "转/分")]
+    [0.1047, 0.1047, 0.1047, 0.1047, 0.1047]
     """
     return _read(text) if 0 < len(text) <= _TEXT_MAX else UnitReading()
+
+
+def read_quantity(text: str) -> UnitReading:
+    """What a number of a unit measures, with the number in the factor; a unit without a number is one of it.
+
+    >>> read_quantity("0.024 N m"), read_quantity("1/131072 rev").si, read_quantity("rpm").si, read_quantity("3 %").si
+    (UnitReading(kind='torque', factor=0.024, rotary=True, si='N m'), 'rad', 'rad/s', '')
+    """
+    if (reading := read_unit(text)).si or not (written := _QUANTITY.fullmatch(text)):
+        return reading
+    reading, number = read_unit(written["unit"]), float(written["number"])
+    divisor = float(written["divisor"] or 1)
+    factor = number / divisor * reading.factor if divisor else 0.0
+    return replace(reading, factor=factor) if reading.si and 0 < factor < inf else UnitReading()
 
 
 def split_plant_unit(text: str) -> tuple[str, str]:
@@ -112,8 +149,12 @@ def _read(text: str) -> UnitReading:
     if reading is None:
         return UnitReading()
     factor, dimension = reading
-    kind = _KIND_OF.get(dimension, "other")
-    return UnitReading(kind, factor, kind == "torque" or dimension[0] == 0) if kind != "other" else UnitReading()
+    if dimension not in _KIND_OF:
+        return UnitReading()
+    kind, si = _KIND_OF[dimension]
+    if dimension in (_PER_SECOND, _PER_SECOND_SQUARED) and _PER_MINUTE.search(text):
+        factor *= 2 * pi  # revolutions per minute: nobody states an angle in radians per minute
+    return UnitReading(kind, factor, kind == "torque" or dimension[0] == 0, si)
 
 
 def _tokens(text: str) -> list[re.Match[str]] | None:

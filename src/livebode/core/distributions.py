@@ -17,6 +17,17 @@ from livebode.arrays import Floats
 normal_quantile = NormalDist().inv_cdf
 """Value that a standard normal variable remains below with a probability."""
 
+COVERAGE = 0.95
+"""Probability with which every bound that is shown covers the true value.
+
+It is the usual level of an expanded uncertainty (JCGM 100:2008, 6.2) and of a confidence interval, and so what a reader
+expects of a ± that says nothing else. Detectors, and the worst case of a design, have levels of their own.
+"""
+INTERVAL_FACTOR = normal_quantile(0.5 + COVERAGE / 2)
+"""Half-width of such an interval of a number, in standard deviations: 1.96."""
+CIRCLE_FACTOR = sqrt(-log(1 - COVERAGE))
+"""Radius of such a circle around a complex number, in standard deviations, where these are known exactly: 1.73."""
+
 _SETTLED, _STEPS_MAX = 1e-13, 100  # some units in the last place, and an end where rounding keeps a step larger
 
 

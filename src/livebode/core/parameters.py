@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Floats
 from livebode.core._wording import counted
-from livebode.core.distributions import normal_quantile
+from livebode.core.distributions import COVERAGE, normal_quantile
 from livebode.core.errors import UsageError
 from livebode.core.rows import RowArrays
 
@@ -128,7 +128,7 @@ class Parameters(RowArrays):
         with np.errstate(invalid="ignore"):
             return np.asarray(np.sqrt(np.einsum("rii->ri", self.covariance)))
 
-    def bound(self, probability: float = 0.95) -> Floats:
+    def bound(self, probability: float = COVERAGE) -> Floats:
         """Half-width of the interval that covers the true value with this probability, shape (rows, parameters).
 
         For a normal error: 1.96 sigma for 95 %. It covers noise and the model error of `epsilon`; a model error that

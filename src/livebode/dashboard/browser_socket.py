@@ -236,9 +236,9 @@ class Client(BrowserSocket):
 
 async def serve_browser(board: Board, socket: WebSocket, client_of: Callable[[Role], BrowserSocket]) -> None:
     """Serve a browser until it disconnects; close the socket of one that may not read, or has no place."""
-    headers, address = socket.headers, socket.client.host if socket.client else ""
+    address = socket.client.host if socket.client else ""
     try:
-        role = board.access.role(headers.get("cookie", ""), headers.get("authorization", ""), address)
+        role = board.access.role_of(socket)
     except ServerError:
         role = None
     if role is None:

@@ -16,7 +16,7 @@
 Of the kind `fits` there is only JSON after the head, as many bytes as there are rows: one row of every parameter, those
 of the fit whose model follows in the same message.
 
-Numbers are little endian, in row order. `reach` is 3σ/|value|: the edges of the ±3σ band are
+Numbers are little endian, in row order. `reach` is bound/|value|, with the radius of 95 %: the edges of the band are
 magnitude + 20·log10(1 ± reach) and phase ± arcsin(reach), undefined for reach ≥ 1. The reach of the noise alone leaves
 out what repeats with the excitation (friction, backlash, encoder steps), and is unknown where that is unknown. Unknown
 values are NaN.
@@ -29,7 +29,7 @@ from typing import Any
 
 import numpy as np
 
-from livebode.core import Quantity, Responses
+from livebode.core import CIRCLE_FACTOR, Quantity, Responses, widened
 from livebode.dashboard.quantities import QUANTITIES
 from livebode.pictures import unwrapped
 from livebode.records import to_json
@@ -39,7 +39,6 @@ KINDS = (
     *("newest", "moment", "reference", "baseline", "model", "rows", "history", "fits"),
     *(f"reference {slot}" for slot in range(2, REFERENCES_MAX + 1)),
 )
-SIGMAS = 3.0
 _HEADER = struct.Struct("<4sBBBBII")
 _MAGIC, _VERSION = b"LBCV", 2
 _WHOLE_PHASE_ROWS = 8  # up to this many rows the phase is unwrapped over frequency
@@ -57,8 +56,9 @@ def frame(kind: str, axis: int, responses: Responses) -> bytes:
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         size = np.where(use, np.abs(responses.value), np.nan)
         magnitude = 20 * np.log10(size)
-        reach = SIGMAS * responses.sigma / size
-        noise = SIGMAS * np.sqrt(np.maximum(responses.sigma**2 - responses.distortion**2, 0.0)) / size
+        reach = responses.bound() / size
+        alone = np.sqrt(np.maximum(responses.sigma**2 - responses.distortion**2, 0.0))
+        noise = widened(alone, responses.dof[:, np.newaxis], CIRCLE_FACTOR) / size
         phase = np.where(use, np.degrees(np.angle(responses.value)), np.nan)
     if rows <= _WHOLE_PHASE_ROWS:
         phase = np.array([unwrapped(p, np.nan_to_num(r) >= 1) for p, r in zip(phase, reach)]).reshape(rows, columns)

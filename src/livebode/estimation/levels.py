@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Floats
-from livebode.core import Lines, Stage, StatefulBase, f_quantile, meets_mains
+from livebode.core import INTERVAL_FACTOR, Lines, Stage, StatefulBase, f_quantile, meets_mains
 from livebode.estimation.detection import Interpolation
 from livebode.estimation.products import power
 from livebode.estimation.spectra import after
@@ -23,7 +23,6 @@ KINDS = ("even", "odd")
 CHANCE = 1e-3
 """Probability that noise alone is taken for a distortion."""
 _BINS_MIN = 2
-_95_PERCENT = 1.96
 _ROUNDING = 1e-24  # of the output's power at a line
 _ON_BIN = 0.1  # bins: hum this close to a bin repeats with the excitation
 _EXCITED = 1e-12  # of the mean power: a line with less has no response
@@ -246,7 +245,7 @@ def _level(sums: Floats, noise: Floats, of_line: float, periods: int, stretches:
     low, middle, high = np.nan, np.nan, excess + (limit - 1) * by_chance
     if significant:
         of_mean = 2 * excess * of_one + stretches * of_one**2 * (1 + stretches / (periods - stretches))
-        half = _95_PERCENT * float(np.sqrt(of_mean / count))
+        half = INTERVAL_FACTOR * float(np.sqrt(of_mean / count))
         low, middle, high = max(excess - half, 0.0), excess, excess + half
     db = [_db(value / periods / of_line) for value in (middle, low, high, by_chance)]
     return Level(db[0], (db[1], db[2]), db[3], count, significant)

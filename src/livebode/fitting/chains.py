@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from math import pi
 from typing import Any, Literal
@@ -213,6 +214,10 @@ class TwoMass(Chain):
         return self._whole(np.stack(parts, axis=-1), grid)
 
 
+def _factor(unit: str) -> str:
+    return f"({unit})" if re.search(r"[\s/]", unit) else unit
+
+
 _HZ = (1e-4, 1e6)
 _RATIO = (1e-6, 2.0)
 
@@ -230,21 +235,37 @@ class TwoMassGain(PhysicalModel):
     ----------
     output
         "velocity" or "position".
+    output_unit, input_unit
+        Their units, which that of the gain follows from; empty where they are not known.
 
     >>> TwoMassGain(output="position").names[:3]
     ('gain', 'antiresonance', 'resonance')
+    >>> TwoMassGain(output_unit="rad/s", input_unit="A").units[0]
+    'rad/s²/A'
     """
 
     output: Literal["velocity", "position"] = "velocity"
+    output_unit: str = ""
+    input_unit: str = ""
     name = Message("two-mass-gain")
 
     def __post_init__(self) -> None:
         _check_choice("output", self.output, ["velocity", "position"])
 
     @property
+    def gain_unit(self) -> str:
+        """Unit of an acceleration per unit of input."""
+        per_s = "s" if self.output == "velocity" else "s²"
+        if not self.output_unit or not self.input_unit:
+            return Message("output units/{per_s} per input unit", per_s=per_s)
+        angular = {"rad": "rad/s²", "rad/s": "rad/s²", "m": "m/s²", "m/s": "m/s²"}
+        acceleration = angular.get(self.output_unit, f"{_factor(self.output_unit)}/{per_s}")
+        return f"{acceleration}/{_factor(self.input_unit)}"
+
+    @property
     def parameters(self) -> tuple[Parameter, ...]:  # type: ignore[override]
         return (
-            Parameter("gain", Message("rad/s² per unit of input"), 1.0, 1e-12, 1e12),
+            Parameter("gain", self.gain_unit, 1.0, 1e-12, 1e12),
             Parameter("antiresonance", "Hz", 10.0, *_HZ),
             Parameter("resonance", "Hz", 20.0, *_HZ),
             Parameter("antiresonance_damping", "", 0.05, *_RATIO),

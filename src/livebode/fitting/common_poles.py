@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from livebode.arrays import Complex, Floats
-from livebode.core import OK, FitError, GridError, Parameters, Response, Responses, UsageError, counted
+from livebode.core import COVERAGE, OK, FitError, GridError, Parameters, Response, Responses, UsageError, counted
 from livebode.fitting.fitter import measured_of
 from livebode.fitting.mean import mean_response
 from livebode.fitting.partial_fractions import PartialFractions, PoleQuantities
@@ -130,11 +130,11 @@ class CommonPoles:
     def __getitem__(self, name: str) -> float:
         return float(self.parameters[name][0])
 
-    def bound(self, name: str, probability: float = 0.95) -> float:
+    def bound(self, name: str, probability: float = COVERAGE) -> float:
         """Half-width of its interval; see `Parameters.bound`."""
         return float(self.parameters.bound(probability)[0, self.parameters.index(name)])
 
-    def rows(self, probability: float = 0.95) -> list[tuple[str, float, float, str]]:
+    def rows(self, probability: float = COVERAGE) -> list[tuple[str, float, float, str]]:
         """Name, value, half-width and unit of all quantities."""
         of = self.parameters
         return list(zip(of.names, of.value[0].tolist(), of.bound(probability)[0].tolist(), of.units))

@@ -78,13 +78,15 @@ class ExtendedModel(PhysicalModel):
     @property
     def parameters(self) -> tuple[Parameter, ...]:  # type: ignore[override]
         least = 0.0 if getattr(self.base, "side", "motor") == "motor" else -inf
+        gain: str = getattr(self.base, "gain_unit", "")
+        compliance = f"{gain} s²" if gain else "rad per unit of input"
         own = {
             LAG: (Parameter("lag", "s", 1e-4, 1e-6, 1.0),),
-            RESIDUAL: (Parameter("residual_compliance", "rad per unit of input", 0.0, least, inf),),
+            RESIDUAL: (Parameter("residual_compliance", compliance, 0.0, least, inf),),
             MODE: (
                 Parameter("mode", "Hz", 1.5 * self.top_hz, 1e-4, 1e6),
                 Parameter("mode_damping", "", START_DAMPING, 1e-6, 2.0),
-                Parameter("mode_gain", Message("rad/s² per unit of input"), 0.0, least, inf),
+                Parameter("mode_gain", gain or Message("rad/s² per unit of input"), 0.0, least, inf),
             ),
         }
         return (*self.base.parameters, *(p for extra in self.extras for p in own[extra]))

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from livebode.core import FitError, Parameters, Response, Responses, not_installed
+from livebode.core import COVERAGE, FitError, Parameters, Response, Responses, not_installed
 from livebode.fitting.competitors import WORDS, AllowedChanges, Competitor, compete, competitor, mixed, positive
 from livebode.fitting.fitter import Fitter
 from livebode.fitting.mean import mean_response
@@ -152,7 +152,7 @@ class Fit:
         part = self.parameters if name in self.parameters.names else self.derived
         return float(part[name][0])
 
-    def bound(self, name: str, probability: float = 0.95) -> float:
+    def bound(self, name: str, probability: float = COVERAGE) -> float:
         """Half-width of its interval; see `Parameters.bound`."""
         part = self.parameters if name in self.parameters.names else self.derived
         return float(part.bound(probability)[0, part.index(name)])
@@ -198,7 +198,7 @@ class Fit:
         below = np.concatenate([transfer.denominator, np.zeros(transfer.integrators)])
         return control.tf(transfer.numerator, below)
 
-    def rows(self, probability: float = 0.95) -> list[tuple[str, float, float, str]]:
+    def rows(self, probability: float = COVERAGE) -> list[tuple[str, float, float, str]]:
         """Name, value, half-width and unit of all fitted and derived quantities; 0 where fixed values determine it."""
         rows = []
         for part in (self.parameters, self.derived):

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from livebode.analysis import Margins, RunMean, averaged, fit_averaged, loop_report
 from livebode.configuration import Axis, FitSection, MachineSection, recorded_configuration, recorded_loop
 from livebode.core import (
+    CIRCLE_FACTOR,
     Event,
     Lines,
     LivebodeError,
@@ -165,7 +166,7 @@ class Run:
         *,
         axes: Any = None,
         bounds: bool = True,
-        c: float = 2.0,
+        c: float = CIRCLE_FACTOR,
         label: str | None = None,
         color: Any = None,
     ) -> Any:
@@ -177,7 +178,7 @@ class Run:
         >>> with tempfile.TemporaryDirectory() as folder:
         ...     axes = livebode.example_run(f"{folder}/monday").plot("nyquist")
         >>> axes.get_legend_handles_labels()[1]
-        ['average', 'bound: 98.2 % (2σ)']
+        ['average', 'bound: 95 %']
         """
         average = self._averaged
         words = label or "average"

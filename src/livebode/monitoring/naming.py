@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from livebode.arrays import Floats
+from livebode.core import INTERVAL_FACTOR
 from livebode.monitoring.accuracy import ChangeAccuracy
 from livebode.monitoring.sensitivity import DIRECTIONS, FAR, LocalChange
 
@@ -16,7 +17,6 @@ _GRID = 0.004
 _STIFFNESS = DIRECTIONS.index("stiffness")
 _FIRM = [DIRECTIONS.index(name) for name in ("stiffness", "load", "inertia")]  # damping doubles easily
 _EXPLAINED = 0.9  # of all evidence: a single change of ten percent of stiffness or double damping explains 0.93 … 0.99
-_CONFIDENCE = 1.96  # 95 % of a normal distribution
 _SHAPE = 0.3  # of a place's depth, which depends on its assumed shape
 
 
@@ -96,7 +96,7 @@ def candidates(segment: ScoredWindows, known: ChangeAccuracy, way_m: float, loca
 def bound(known: ChangeAccuracy, direction: int, information: float) -> float:
     """Half-width of the 95 % bound, from windows with this total information."""
     noise = np.sqrt(known.inflation[direction] / information)
-    return float(_CONFIDENCE * np.hypot(noise, known.scatter[direction]))
+    return float(INTERVAL_FACTOR * np.hypot(noise, known.scatter[direction]))
 
 
 def _place(segment: ScoredWindows, known: ChangeAccuracy, way_m: float) -> NamedChange:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.arrays import Floats
-from livebode.core import Event, Stage, StatefulBase
+from livebode.core import INTERVAL_FACTOR, Event, Stage, StatefulBase
 from livebode.language import Message
 from livebode.monitoring import evidence as word
 from livebode.monitoring.change_date import date_of, rows_of
@@ -117,7 +117,6 @@ class NewestRows:
 _LOOK_WINDOWS = 10  # rows between detection and report, so that all changes are visible
 _LOOK_SECTIONS = 2  # the same of friction and orders: the second one is the first that is whole
 _KEPT = 600  # rows, over which the amount of a change is taken at most
-_CONFIDENCE = 1.96  # 95 % of a normal distribution
 _CHANGED_FROM = 3.0  # standard deviations, from which on a component counts among what changed
 
 
@@ -258,7 +257,7 @@ class TableMonitor(StatefulBase):
         self._seen_in[moment[:, 3].astype(int)] = True
         rows = rows_of(scores[:, shown], informations[:, shown], moments[:, 2], accuracy.scatter[shown])
         date = date_of(rows, moments[:, 2], moments[:, 1].astype(int).tolist(), healthy_before=self._cleared)
-        event = differs(self._table, changed, amount, _CONFIDENCE * sigma, moment, date)
+        event = differs(self._table, changed, amount, INTERVAL_FACTOR * sigma, moment, date)
         # A named component without a sum of its own gets one that keeps the alarm active.
         up = np.stack([amount > 0, amount <= 0]) & changed
         self._charts.sums = np.where(up, self._charts.threshold, 0.0)

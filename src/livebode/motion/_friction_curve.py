@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.arrays import Floats
-from livebode.core import Block, SignalError, UsageError, t_quantile
+from livebode.core import COVERAGE, Block, SignalError, UsageError, t_quantile
 from livebode.motion.robust_regression import Regression, regress
 from livebode.motion.smooth_motion import OutputKind, SmoothMotion
 
@@ -41,7 +41,7 @@ class FrictionCurve:
         asymmetry (Fv forward minus Fv backward, halved; only in `directions`), and stribeck Fs, stribeck_speed vs if
         found.
     value, covariance
-        Shape (parameters,) and (parameters, parameters), in the units of the recording.
+        Shape (parameters,) and (parameters, parameters), in SI units.
     dof
         Degrees of freedom of each variance, shape (parameters,).
     places
@@ -73,7 +73,7 @@ class FrictionCurve:
         """Standard deviation of each parameter, shape (parameters,)."""
         return np.asarray(np.sqrt(np.diag(self.covariance)))
 
-    def bound(self, probability: float = 0.95) -> Floats:
+    def bound(self, probability: float = COVERAGE) -> Floats:
         """Half-width of the interval that covers the true value with this probability, shape (parameters,).
 
         By Student's t, because the covariance is estimated from correlated residuals. A model error, such as friction
@@ -96,7 +96,7 @@ class FrictionCurve:
             )
         return self.names.index(name)
 
-    def at(self, velocity: Floats, probability: float = 0.95) -> tuple[Floats, Floats]:
+    def at(self, velocity: Floats, probability: float = COVERAGE) -> tuple[Floats, Floats]:
         """Friction at these speeds with its bound, without the offset, as the mean over the places; (speeds,) each."""
         slope = self._slopes(np.asarray(velocity, dtype=np.float64))
         linear = slope.copy()
@@ -106,7 +106,7 @@ class FrictionCurve:
         least = int(self.dof[np.any(slope != 0, axis=0)].min(initial=self.dof.max()))
         return linear @ self.value, np.sqrt(variance) * t_quantile(0.5 + probability / 2, least)
 
-    def direction(self, sign: int, probability: float = 0.95) -> tuple[Floats, Floats]:
+    def direction(self, sign: int, probability: float = COVERAGE) -> tuple[Floats, Floats]:
         """Coulomb and viscous friction of one direction with their bounds, shapes (2,) and (2,).
 
         The offset counts as Coulomb friction: Fc ± F0 and Fv ± asymmetry. Needs a curve of `directions`, no places.

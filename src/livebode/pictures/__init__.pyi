@@ -11,7 +11,6 @@ from livebode.pictures._style import shortened as shortened
 from livebode.pictures._style import style as style
 from livebode.pictures._style import wide_letters as wide_letters
 from livebode.pictures.bode import bode_figure as bode_figure
-from livebode.pictures.curves import MEAN_C as MEAN_C
 from livebode.pictures.curves import Cloud as Cloud
 from livebode.pictures.curves import Curve as Curve
 from livebode.pictures.curves import bound_db as bound_db

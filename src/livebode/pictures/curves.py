@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import log, sqrt
 from typing import Any
 
 import numpy as np
@@ -143,13 +142,6 @@ class Cloud:
         return f"5–95 % of {len(self.value)} responses"
 
 
-# The probability of ±3 standard deviations of a normal variable, used for the circle around a complex response.
-PROBABILITY = 0.9973
-BOUND_C = sqrt(-log(1 - PROBABILITY))
-MEAN_PROBABILITY = 0.95
-MEAN_C = sqrt(-log(1 - MEAN_PROBABILITY))
-
-
 @dataclass(frozen=True)
 class Summary:
     """5 %, 50 % and 95 % quantiles over the run, each of shape (3, lines); NaN for a line that was never valid.
@@ -179,9 +171,9 @@ def summarised(responses: Responses, mean: Response | None = None) -> Summary:
     rows = np.flatnonzero(use.any(axis=1))
     newest = responses[int(rows[-1])] if rows.size else None
     newest_value = value[rows[-1]] if rows.size else np.full(len(responses.lines), complex(np.nan))
-    bound = responses[int(rows[-1])].bound(BOUND_C) if rows.size else np.full(len(responses.lines), np.nan)
+    bound = responses[int(rows[-1])].bound() if rows.size else np.full(len(responses.lines), np.nan)
     if mean is not None:
-        newest, bound = mean, mean.bound(MEAN_C)
+        newest, bound = mean, mean.bound()
         newest_value = np.where(mean.valid & np.isfinite(mean.value) & (mean.value != 0), mean.value, np.nan)
     magnitude_db = quantiles(decibels(value))
     middle_deg, deviation_deg = circular(value)

@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.arrays import Floats
-from livebode.core import REASONS, MatrixResponses, decibels, moment
+from livebode.core import COVERAGE, REASONS, MatrixResponses, decibels, moment
 from livebode.language import tr, worded
 from livebode.pictures._style import Style, drawing, heading, new_figure, plain, shortened, style
-from livebode.pictures.curves import BOUND_C, PROBABILITY, bound_db
+from livebode.pictures.curves import bound_db
 from livebode.pictures.plots import FEW_LINES, alone, bound
 from livebode.pictures.png import save
 from livebode.pictures.words import lines_phrase
@@ -52,7 +52,7 @@ def save_matrix_pictures(
 def matrix_figure(
     responses: MatrixResponses, *, title: str = "", dark: bool = False, width_in: float | None = None
 ) -> Figure:
-    """A Bode plot of each entry: outputs down, inputs across, with the 99.7 % bounds of the newest matrix.
+    """A Bode plot of each entry: outputs down, inputs across, with the 95 % bounds of the newest matrix.
 
     Lines at which a column is invalid are shaded in its plots, with the reason where there is none that is valid.
     Without `width_in`, the width follows the number of inputs.
@@ -67,7 +67,7 @@ def matrix_figure(
         heading(figure, look, title or tr("Bode plots"), _facts(responses), left)
         _key(figure, look, left, bool((responses.reason != 0).any()))
         panels = _panels(figure, down, across)
-        responses.plot(axes=panels, c=BOUND_C, color=look.newest)
+        responses.plot(axes=panels, color=look.newest)
         for o in range(down):
             for i in range(across):
                 _entry(list(panels[2 * o : 2 * o + 2, i]), look, responses, (o, i))
@@ -82,12 +82,12 @@ def matrix_figure(
 
 
 def singular_values_figure(responses: MatrixResponses, *, title: str = "", dark: bool = False) -> Figure:
-    """The singular values of the newest matrix over frequency, each with the bound that covers it with 99.7 %."""
+    """The singular values of the newest matrix over frequency, each with the bound that covers it with 95 %."""
     look, f = style(dark), responses.frequency_hz
     with drawing(look):
         from livebode.pictures.scales import frequency_axis
 
-        figure, bounds = new_figure(9.0, 4.8), tr("bounds: {percent:.1f} %", percent=100 * PROBABILITY)
+        figure, bounds = new_figure(9.0, 4.8), tr("bounds: {percent:g} %", percent=100 * COVERAGE)
         heading(
             figure,
             look,
@@ -96,7 +96,7 @@ def singular_values_figure(responses: MatrixResponses, *, title: str = "", dark:
             0.085,
         )
         axes = figure.add_axes((0.085, 0.115, 0.79, 0.72))
-        values, radius = responses.singular_values[-1], responses.singular_value_bound(BOUND_C)[-1]
+        values, radius = responses.singular_values[-1], responses.singular_value_bound()[-1]
         ends = [bound_db(value, around) for value, around in zip(values.T.astype(complex), radius.T)]
         for n, (value, (low, high)) in enumerate(zip(values.T, ends)):
             _singular_value(axes, look, f, n, value, low, high)
@@ -216,8 +216,8 @@ def _key(figure: Figure, look: Style, left: float, invalid: bool) -> None:
     handles: list[Line2D | Patch] = [Line2D([], [], color=look.newest, linewidth=1.6)]
     texts = [
         tr(
-            "response; {percent:.1f} % bounds of each entry alone, as bars where larger than the marker",
-            percent=100 * PROBABILITY,
+            "response; {percent:g} % bounds of each entry alone, as bars where larger than the marker",
+            percent=100 * COVERAGE,
         )
     ]
     if invalid:

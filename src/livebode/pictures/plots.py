@@ -249,8 +249,8 @@ def _panels(kind: PlotKind, axes: Any) -> Any:
 def _curve(response: Response, c: float | None, label: str | None, color: Any) -> Curve:
     use = response.valid & np.isfinite(response.value) & (response.value != 0)
     # Also without a drawn bound: the phase of a line that may be zero follows the other lines.
-    radius = response.bound(2.0 if c is None else c)
-    words = "" if c is None else f"bound: {100 * -np.expm1(-(c**2)):.1f} % ({c:g}σ)"
+    radius = response.bound() if c is None else response.bound(c)
+    words = "" if c is None else f"bound: {100 * -np.expm1(-(c**2)):.3g} %"
     value = np.where(use, response.value, np.nan)
     return Curve(response.frequency_hz, value, np.where(use, radius, np.nan), label or response.quantity, words, color)
 

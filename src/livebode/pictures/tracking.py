@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.arrays import Floats
-from livebode.core import Responses, decibels
+from livebode.core import COVERAGE, Responses, decibels
 from livebode.language import numerals, tr
 from livebode.pictures import ticks, words
 from livebode.pictures._style import Style, drawing, empty_note, heading, new_figure, plain, shortened, style
-from livebode.pictures.curves import BOUND_C, PROBABILITY, usable
+from livebode.pictures.curves import usable
 from livebode.pictures.map import draw_maps
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ def tracking_figure(
 ) -> Figure:
     """Magnitude of every line in dB over time and, if the run has a schedule that varies, over the schedule.
 
-    Up to ten lines are traces with a light band, the bound that covers the true value with a probability of 99.7 %,
+    Up to ten lines are traces with a light band, the bound that covers the true value with a probability of 95 %,
     each labelled at its end. Over the schedule they are points, filled while it rises and hollow while it falls,
     because the response of a moving machine depends on the direction. More lines become maps over frequency: the
     magnitude, and below it the change from the median of the run. Intervals without a valid response remain open.
@@ -101,7 +101,7 @@ def _traces(
         wspace=0.06,
     )
     values = np.where(use, responses.value, np.nan)
-    bounds = bounds_db(values, np.where(use, responses.bound(BOUND_C), np.nan))
+    bounds = bounds_db(values, np.where(use, responses.bound(), np.nan))
     colours = look.traces[: len(responses.lines)]
     panels = []
     if schedule:
@@ -264,9 +264,7 @@ def _key(figure: Figure, look: Style, left: float, schedule: bool, bounded: bool
         entries.append((Line2D([], [], markerfacecolor=look.muted, **dot), tr("rising")))  # type: ignore[arg-type]
         entries.append((Line2D([], [], markerfacecolor=look.paper, **dot), tr("falling")))  # type: ignore[arg-type]
     if bounded:
-        entries.append(
-            (Patch(facecolor=look.muted, alpha=0.3), tr("bound: {percent:.1f} % (3σ)", percent=100 * PROBABILITY))
-        )
+        entries.append((Patch(facecolor=look.muted, alpha=0.3), tr("bound: {percent:g} %", percent=100 * COVERAGE)))
     figure.legend(
         [handle for handle, _ in entries],
         [text for _, text in entries],

@@ -148,7 +148,7 @@ def measurements_of(parts: Sequence[Parameters]) -> tuple[Measurement, ...]:
         if not len(part):
             continue
         newest = part[-1:]
-        bound = newest.bound(0.95)[0]
+        bound = newest.bound()[0]
         for name, unit, value, half in zip(part.names, part.units, newest.value[0].tolist(), bound.tolist()):
             found.setdefault(name, Measurement(name, unit, _number(value), _number(half)))
     return tuple(found.values())

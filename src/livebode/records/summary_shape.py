@@ -25,8 +25,10 @@ class _Kinds(DeferredModel):
 
     output: QuantityKind | None
     input: QuantityKind | None
-    input_factor: Annotated[float, Field(gt=0)]
-    output_factor: Annotated[float, Field(gt=0)] = 1.0
+    output_unit: Text = ""
+    input_unit: Text = ""
+    output_name: Text = ""
+    input_name: Text = ""
 
 
 class _Samples(_Part):
@@ -48,7 +50,7 @@ class _Found(_Part):
     quantity: Text
     unit: Text
     clock: ClockKind | None = None
-    kinds: _Kinds = _Kinds(output=None, input=None, input_factor=1.0)
+    kinds: _Kinds = _Kinds(output=None, input=None)
     hop: Positive = 1
     frequency_hz: list[float] = []
     schedule: Text | None = None

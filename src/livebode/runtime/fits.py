@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from livebode.analysis import OpenLoop, against_lines, loop_report, margins, plain_fit, proposed_filter
-from livebode.configuration import FitSection, chosen_model, fitter_of
+from livebode.configuration import FitSection, chosen_model, fitter_of, unknown_gain
 from livebode.core import Event, Loop, Parameters, PlantKinds, Responses, Stage, decode, encode, moment
 from livebode.fitting import Fit, Fitter, best_of, fit_of
 
@@ -130,6 +130,7 @@ class Fits:
         """For run.json: the model, the number of fits of each status, and the newest valid fit."""
         return {
             "model": self._fitter.model.name if self._fitter else None,
+            "unknown_gain": unknown_gain(self.section, self._kinds),
             "statuses": self._counts,
             "newest": None if newest is None else plain_fit(newest),
         }

@@ -10,9 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
-from livebode.core import Channel, LivebodeError, RecordError, RunClock
+from livebode.core import SI_UNITS, Channel, LivebodeError, RecordError, RunClock
 from livebode.records import RunRecord, channels_of
 from livebode.runtime.sender_numbers import NumberedFrom, SenderNumbers
+from livebode.sources import Quantities
 from livebode.sources.live import (
     VALUES_MAX,
     Address,
@@ -22,7 +23,6 @@ from livebode.sources.live import (
     SenderSample,
     SourceSettings,
     make_source,
-    with_kinds,
 )
 from livebode.tables import Table
 
@@ -51,7 +51,7 @@ class RecordedRun:
             )
         summary = self._run.summary
         kinds = summary.get("configuration", {}).get("source", {}).get("kinds") or {}
-        self.channels: tuple[Channel, ...] = with_kinds(channels_of(first.schema), kinds)
+        self.channels: tuple[Channel, ...] = Quantities(kinds).of(channels_of(first.schema))
         self.rate_hz = float(self._run.found["rate_hz"])
         pieces = SenderNumbers.of(summary.get("numbering", ())).pieces
         begun = int(first["sample"][0])
@@ -120,4 +120,7 @@ def source_of(settings: SourceSettings) -> LiveSource:
         log = RecordedRun(path)
     except LivebodeError as error:
         raise error.at("source.replay") from None
-    return ReplaySource(settings, Address("replay", path=str(path)), log)
+    # What is recorded in SI units was converted when it was read.
+    open_units = {channel.name for channel in log.channels if channel.unit not in SI_UNITS}
+    units = {name: unit for name, unit in settings.units.items() if name in open_units}
+    return ReplaySource(settings.model_copy(update={"units": units}), Address("replay", path=str(path)), log)

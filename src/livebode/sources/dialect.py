@@ -187,15 +187,30 @@ def with_comment_header(dialect: Dialect, above: str) -> Dialect:
 
 
 def find_encoding(sample: bytes) -> tuple[str, int]:
-    """Encoding, and length of the byte order mark: UTF-16 by its mark, else UTF-8 where it decodes, else Latin-1."""
+    """Encoding, and length of the byte order mark: UTF-16 by its mark, else UTF-8 where it decodes.
+
+    Else GB 18030, where all bytes of letters are in pairs as in Chinese (GB 2312); else Latin-1.
+
+    >>> [find_encoding("转矩 [N m]".encode(of))[0] for of in ("utf-8", "gb18030")], find_encoding(b"Dr\\xfccke [\\xb0]")
+    (['utf-8', 'gb18030'], ('latin-1', 0))
+    """
     if sample[:2] in UTF16:
         return UTF16[sample[:2]], 2
     mark = 3 if sample.startswith(codecs.BOM_UTF8) else 0
     try:
         codecs.getincrementaldecoder("utf-8")().decode(sample[mark:])  # a character cut at the end is not an error
     except UnicodeDecodeError:
-        return "latin-1", 0
+        return ("gb18030" if _in_chinese(sample) else "latin-1"), 0
     return "utf-8", mark
+
+
+def _in_chinese(sample: bytes) -> bool:
+    """Whether the bytes are a text in GB 2312, whose letters are pairs of bytes of which both have the highest bit."""
+    try:
+        codecs.getincrementaldecoder("gb2312")().decode(sample)
+    except UnicodeDecodeError:
+        return False
+    return True
 
 
 def find_lines(path: Path, text: str, *, whole: bool) -> list[Line]:

@@ -1,4 +1,6 @@
-"""Channels that are computed from others: names, numbers, + - * /, a sign, parentheses and diff; nothing else."""
+"""Channels that are computed from others: names, numbers, + - * /, a sign, parentheses and diff; nothing else.
+
+Its operands are in SI units where their units are recognised."""
 
 from __future__ import annotations
 
@@ -13,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from livebode.arrays import Floats
-from livebode.core import Block, Channel, QuantityKind, UsageError
+from livebode.core import Block, Channel, QuantityKind, UsageError, read_unit
 from livebode.sources.units import split_unit
 
 _UNIT_MAX = 64
@@ -140,7 +142,7 @@ class Expression:
         """Its samples from those of its channels, shape (samples,); the first `before` ones are NaN."""
         with np.errstate(all="ignore"):  # a division by 0 gives a sample that is not finite, as in a file
             found = _walk(self.tree, lambda node: data[_name(node, self.quoted)], _Arithmetic(rate_hz))
-        return np.asarray(found, dtype=np.float64)
+        return np.asarray(found, dtype=np.float64) * read_unit(self.unit).factor
 
     def channel(self, channels: Mapping[str, Channel]) -> Channel:
         """Its name, unit and kind, from those of its channels.
@@ -156,7 +158,8 @@ class Expression:
 
         found = _walk(self.tree, of, _Units())
         if self.unit:
-            return Channel(self.text, self.unit)
+            reading = read_unit(self.unit)
+            return Channel(self.text, reading.si or self.unit, written=self.unit if reading.si != self.unit else "")
         return Channel(self.text, found.unit, found.kind) if found.kind else Channel(self.text, found.unit)
 
 

@@ -7,32 +7,11 @@ import re
 from collections import Counter
 from collections.abc import Collection, Sequence
 
-from livebode.core import read_unit
 from livebode.sources.cells import EMPTY, CellKind, is_moment, is_number, is_value, is_word
-from livebode.sources.units import BRACKETED, SECONDS, split_unit, unbracketed
+from livebode.sources.units import BRACKETED, SECONDS, is_unit, split_unit, unbracketed
 
-_UNITS = frozenset(
-    (
-        "v",
-        "volt",
-        "volts",
-        "mv",
-        "amp",
-        "amps",
-        "ampere",
-        "ma",
-        "w",
-        "hz",
-        "db",
-        "%",
-        "°c",
-        "bar",
-        "g",
-        "value",
-        "counts",
-    )
-)
-"""Besides those of time and of the kinds of quantities; without capitals."""
+_UNITS = frozenset(("volt", "volts", "amp", "amps", "ampere", "w", "hz", "db", "°c", "bar", "value"))
+"""In addition to those of `is_unit`; without capitals."""
 
 
 def find_header(
@@ -81,10 +60,7 @@ def are_units(cells: list[str]) -> bool:
     if max(Counter(filled).values(), default=0) > 1:
         return True
     texts = [unbracketed(cell).casefold() for cell in filled]
-    return bool(texts) and all(
-        text in SECONDS or text in _UNITS or read_unit(unbracketed(cell)).kind != "other"
-        for text, cell in zip(texts, filled)
-    )
+    return bool(texts) and all(text in _UNITS or is_unit(unbracketed(cell)) for text, cell in zip(texts, filled))
 
 
 def are_names(cells: list[str]) -> bool:

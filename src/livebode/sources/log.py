@@ -10,10 +10,11 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Block, Channel, ClockKind, LivebodeError, QuantityKind, RecordingError, UsageError
+from livebode.core import Block, Channel, ClockKind, LivebodeError, RecordingError, UsageError
 from livebode.locations import Location
 from livebode.sources.expressions import Expression, computed_blocks
 from livebode.sources.naming import explained, found_channel, resolve
+from livebode.sources.quantities import Quantities, in_si
 from livebode.sources.recording import Chunk, Column, Recording, Skipped, guarded, located, stacked
 from livebode.sources.timing import Clock, Timing
 
@@ -48,14 +49,14 @@ class Log:
         chosen: Sequence[str],
         clock: Clock,
         block_samples: int,
-        kinds: Mapping[str, QuantityKind],
+        quantities: Quantities,
     ) -> None:
         self._recording = recording
         self._columns = tuple(columns)
         self._chosen = tuple(chosen)
         self._clock = clock
         self._block_samples = block_samples
-        self._kinds = kinds
+        self._quantities: Quantities | None = quantities
         self.first = 0
         """Number of the first sample that `blocks` reads."""
         self._stop: int | None = None
@@ -221,7 +222,8 @@ class Log:
         Yields
         ------
         Block
-            float64, shape (channels, ≤ block_samples). Empty cells are NaN; NaN and infinities are unchanged.
+            float64, shape (channels, ≤ block_samples), in SI units where the unit is recognised. Empty cells are NaN;
+            NaN and infinities are unchanged.
 
         Raises
         ------
@@ -275,6 +277,12 @@ class Log:
         chosen._named = self._labels(self._found([name for name in names if name not in known]))
         return chosen
 
+    def as_written(self) -> Log:
+        """The same recording in the units of the file, for a reader that converts them itself."""
+        other = copy(self)
+        other._quantities = None
+        return other
+
     def check_clocks(self, names: Sequence[str]) -> None:
         """RecordingError if a channel has another clock; other errors are left to the reading."""
         for name in names:
@@ -323,8 +331,9 @@ class Log:
                 yield block.cut(first, stop)
 
     def _label(self, column: Column, name: str) -> Channel:
-        kind = self._kinds.get(column.name)
-        return Channel(name, column.unit) if kind is None else Channel(name, column.unit, kind)
+        if self._quantities is None:
+            return Channel(name, column.unit)
+        return self._quantities.channel(name, column.unit, column.name)
 
     def _read(self, columns: Sequence[Column], rows: int) -> Iterator[Chunk]:
         return guarded(self._recording.chunks(columns, rows), self._recording.path, self._recording.format)
@@ -338,7 +347,7 @@ class Log:
             length = len(chunk[0])
             for first, last in pieces(row, row + length, cuts, limit):
                 yield Block(
-                    stacked([values[first - row : last - row] for values in chunk]),
+                    in_si(stacked([values[first - row : last - row] for values in chunk]), labels),
                     labels,
                     clock.rate_hz,
                     start=first + int(missing[np.searchsorted(clock.gap_rows, first, side="right")]),

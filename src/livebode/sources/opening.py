@@ -16,6 +16,7 @@ from livebode.locations import Url, location
 from livebode.sources.formats import open_file
 from livebode.sources.log import Log, checked_block_samples
 from livebode.sources.naming import explained, reasons, resolve, together
+from livebode.sources.quantities import Quantities
 from livebode.sources.recording import Column, Recording, guarded, located
 from livebode.sources.timing import (
     JITTER_MAX,
@@ -47,6 +48,7 @@ def open_log(
     dbc: str | os.PathLike[str] | None = None,
     block_samples: int = 65536,
     kinds: Mapping[str, QuantityKind] | None = None,
+    units: Mapping[str, str] | None = None,
     clock: ClockKind | None = None,
 ) -> Log:
     """Open a recording of any format that `docs/reference/readers.md` lists.
@@ -67,7 +69,11 @@ def open_log(
     block_samples
         Largest length of a Block.
     kinds
-        Kind of quantity of some channels, by name. Default: the one that the unit shows (`Channel`).
+        Kind of quantity of some channels, by name. Default: the one that the unit shows, otherwise the name.
+    units
+        Quantity of one unit of some channels, by name: "rpm", or "0.024 N m" for 1 % of a rated torque of 2.4 N m.
+        Default: the unit in the file, otherwise the one at the end of the name (`speed_rpm`). What is read is in SI
+        units where they are recognised (`Channel.written` has the unit in the file).
     clock
         Whether the time column is in seconds since 1970 ("utc") or since any other moment ("relative"). Default: from
         its first value; "relative" without a time column.
@@ -95,6 +101,12 @@ def open_log(
     [array([1.5, 1.6, 1.7])]
     >>> log.rate_hz, log.channels[1]
     (1000.0, Channel(name='iq', unit='A', kind='current'))
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = Path(folder) / "log.csv"
+    ...     _ = path.write_text("t_ms;Istdrehzahl [1/min];load_pct\\n0;0;50\\n1;60;50\\n2;120;25\\n")
+    ...     log = open_log(path, units={"load_pct": "0.024 N m"})
+    ...     [block.data.round(4).tolist() for block in log.blocks()], [channel.unit for channel in log.channels[1:]]
+    ([[[0.0, 6.2832, 12.5664], [1.2, 1.2, 0.6]]], ['rad/s', 'N m'])
     """
     return log_of(
         open_file(location(path), None if dbc is None else Path(dbc)),
@@ -102,7 +114,7 @@ def open_log(
         time=time,
         channels=channels,
         block_samples=block_samples,
-        kinds=kinds,
+        quantities=Quantities(kinds or {}, units or {}),
         clock=clock,
     )
 
@@ -114,10 +126,13 @@ def log_of(
     time: str | None = None,
     channels: Sequence[str] | None = None,
     block_samples: int = 65536,
-    kinds: Mapping[str, QuantityKind] | None = None,
+    quantities: Quantities | None = None,
     clock: ClockKind | None = None,
 ) -> Log:
-    """The log of a recording that `open_file` opened; parameters and errors as of `open_log`."""
+    """The log of a recording that `open_file` opened; parameters and errors as of `open_log`.
+
+    `quantities` has the kinds and the units.
+    """
     if rate_hz is not None and not (np.isfinite(rate_hz) and rate_hz > 0):
         raise UsageError(
             "out-of-range",
@@ -128,7 +143,7 @@ def log_of(
         )
     checked_block_samples(block_samples)
     with located(recording.place), explained(recording.skipped):
-        log = _log_of(recording, rate_hz, time, channels, block_samples, kinds or {}, clock)
+        log = _log_of(recording, rate_hz, time, channels, block_samples, quantities or Quantities(), clock)
     _logger.info("%s: %s, %d channels at %.9g Hz", log.path, log.format, len(log.channels), log.rate_hz)
     return log
 
@@ -155,7 +170,7 @@ def _log_of(
     time: str | None,
     channels: Sequence[str] | None,
     block_samples: int,
-    kinds: Mapping[str, QuantityKind],
+    quantities: Quantities,
     clock_kind: ClockKind | None,
 ) -> Log:
     columns = together(recording, channels, time)
@@ -168,7 +183,7 @@ def _log_of(
             "check that the recording is complete",
             path=str(recording.path),
         )
-    declared = {resolve(name, columns, recording.columns).name: kind for name, kind in kinds.items()}
+    declared = quantities.renamed({name: resolve(name, columns, recording.columns).name for name in quantities.names})
     if clock_kind == "utc" and time_column is None:
         raise UsageError(
             "conflict",

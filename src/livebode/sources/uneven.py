@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.arrays import Floats
-from livebode.core import Block, Channel, ClockKind, QuantityKind, RecordingError, UsageError, clock_kind_of
+from livebode.core import Block, Channel, ClockKind, RecordingError, UsageError, clock_kind_of
 from livebode.sources.expressions import Expression
 from livebode.sources.log import Log
 from livebode.sources.naming import found_channel, resolve, together
+from livebode.sources.quantities import Quantities, in_si
 from livebode.sources.recording import Column, Recording, Skipped, guarded, located, stacked
 from livebode.sources.resample import Resampler
 from livebode.sources.stamps import Stamps, stamps_of
@@ -56,13 +57,13 @@ class UnevenLog(Log):
         rate_hz: float | None,
         time: str | None,
         block_samples: int,
-        kinds: Mapping[str, QuantityKind],
+        quantities: Quantities,
         clock_kind: ClockKind | None,
     ) -> None:
         self._time, self._given_hz = time, rate_hz
         self._stamps: dict[str, Stamps] = {}
         self._clocks: dict[str, tuple[Column, str]] = {}
-        super().__init__(recording, self._with_clock(recording), chosen, Clock(1.0, ""), block_samples, kinds)
+        super().__init__(recording, self._with_clock(recording), chosen, Clock(1.0, ""), block_samples, quantities)
         groups = [self._group_of(name) for name in chosen]
         self._groups = frozenset(groups)
         self._reference = self._stamps_of(groups[0])
@@ -199,8 +200,9 @@ class UnevenLog(Log):
         parts: dict[str, Column] = {}
         for name, one in found.items():
             parts |= self._columns_of(one) if isinstance(one, Expression) else {name: one}
+        labels = [self._label(column, name) for name, column in parts.items()]
         for time, *values in self._read([clock, *parts.values()], _ROWS):
-            data = dict(zip(parts, stacked(values)))
+            data = dict(zip(parts, in_si(stacked(values), labels)))
             rows = [one.values(data, np.nan) if isinstance(one, Expression) else data[n] for n, one in found.items()]
             yield stamps.since(_exact(time), self._reference), np.array(rows)
 
@@ -241,7 +243,7 @@ def uneven_log_of(
     rate_hz: float | None = None,
     time: str | None = None,
     block_samples: int = 65536,
-    kinds: Mapping[str, QuantityKind] | None = None,
+    quantities: Quantities | None = None,
     clock: ClockKind | None = None,
 ) -> UnevenLog:
     """The log of a recording whose channels have clocks of their own, or a clock that jitters.
@@ -250,8 +252,8 @@ def uneven_log_of(
     ----------
     recording
         As `open_file` returns it.
-    time, block_samples, kinds, clock
-        As for `open_log`.
+    time, block_samples, quantities, clock
+        As for `log_of`.
     channels
         Channels in use, the reference first; their common time is what is read. If none is named, those that `open_log`
         chooses.
@@ -268,6 +270,7 @@ def uneven_log_of(
         everything = recording.columns
         for name in channels:
             found_channel(name, everything, everything)
-        declared = {resolve(name, everything, everything).name: kind for name, kind in (kinds or {}).items()}
+        declared = quantities or Quantities()
+        declared = declared.renamed({name: resolve(name, everything, everything).name for name in declared.names})
         chosen = list(channels) or _most(recording, time)
         return UnevenLog(recording, chosen, rate_hz, time, block_samples, declared, clock)

@@ -25,13 +25,17 @@ SECONDS = {
 """Length of each unit of time in seconds."""
 
 
-def is_unit(text: str) -> bool:
-    """Whether it is a usual unit: of time, of the kinds of quantities, or V.
+RELATIVE = frozenset(("%", "‰", "v", "mv", "counts", "count", "cts", "inc", "incr", "inkr", "inkremente", "lsb"))
+"""Units without an SI value of their own; without capitals."""
 
-    >>> is_unit("mV"), is_unit("rad/s"), is_unit("sec"), is_unit("k"), is_unit("")
-    (True, True, True, False, False)
+
+def is_unit(text: str) -> bool:
+    """Whether it is a usual unit: of time, of the kinds of quantities, or relative to something.
+
+    >>> is_unit("mV"), is_unit("rad/s"), is_unit("sec"), is_unit("%"), is_unit("k"), is_unit("")
+    (True, True, True, True, False, False)
     """
-    return text.casefold() in SECONDS or text in ("V", "mV") or read_unit(text).kind != "other"
+    return text.casefold() in SECONDS or text.casefold() in RELATIVE or read_unit(text).kind != "other"
 
 
 def split_unit(text: str) -> tuple[str, str]:

@@ -113,7 +113,7 @@ def test_curves_and_bounds_are_those_of_the_changed_controllers_in_every_quantit
         # T and S travel as float32 and become L again: relative to what is near −1 and near zero.
         assert np.allclose(10 ** (db / 20) * np.exp(1j * np.radians(deg)), curve, rtol=3e-4, atol=2e-4), quantity
         radius = tab.numbers("bode.curves['what if'].reach") * np.abs(curve)
-        assert np.allclose(radius, 3 * newest.sigma * by, rtol=2e-3, atol=1e-4), quantity
+        assert np.allclose(radius, newest.bound() * by, rtol=2e-3, atol=1e-4), quantity
     tab.page.locator('#quantities [data-value="plant"]').click()
     tab.until("bode.curves.measured?.frame.quantity === 'plant' && !bode.curves['what if']")
     tab.page.locator("#what-if-open-loop").click()

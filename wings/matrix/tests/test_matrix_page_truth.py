@@ -67,9 +67,9 @@ def matrix(directory: Path) -> MatrixResponses:
 def test_every_entry_has_the_values_and_bounds_of_the_record(tab: Tab, gantry: Path) -> None:
     newest = matrix(gantry)[-1:]
     for o, i in np.ndindex(len(OUTPUTS), len(INPUTS)):
-        value, sigma = newest.value[0, :, o, i], newest.sigma[0, :, o, i]
+        value, bound = newest.value[0, :, o, i], newest.bound()[0, :, o, i]
         assert np.allclose(tab.numbers(f"matrix.answer.entries[{o}][{i}].db"), 20 * np.log10(np.abs(value)))
-        assert np.allclose(tab.numbers(f"matrix.answer.entries[{o}][{i}].reach"), 3 * sigma / np.abs(value))
+        assert np.allclose(tab.numbers(f"matrix.answer.entries[{o}][{i}].reach"), bound / np.abs(value))
     for k in range(2):
         expected = 20 * np.log10(newest.singular_values[0, :, k])
         assert np.allclose(tab.numbers(f"matrix.answer.singular_db[{k}]"), expected)

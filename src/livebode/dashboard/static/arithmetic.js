@@ -77,7 +77,7 @@ export function ratio(a, b) {
 }
 
 /**
- * A − B as complex numbers; the variances add.
+ * A − B as complex numbers; the squares of the bounds add.
  *
  * @param {Curve} a
  * @param {Curve} b
@@ -90,6 +90,6 @@ export function difference(a, b) {
   return {
     db: Array.from(size, (v) => 20 * Math.log10(v)),
     deg: Array.from(re, (v, i) => (Math.atan2(im[i], v) * 180) / Math.PI),
-    reach: Array.from(size, (v, i) => (3 * together(one.sigma[i], other.sigma[i])) / v),
+    reach: Array.from(size, (v, i) => together(one.radius[i], other.radius[i]) / v),
   };
 }

@@ -40,12 +40,12 @@ export function nicholsT(m, count) {
 }
 
 /**
- * The edge of the circle of radius 3σ around a value, as phase in degrees and magnitude in dB. It is closed if 3σ is
+ * The edge of the circle of the bound around a value, as phase in degrees and magnitude in dB. It is closed if it is
  * smaller than the value. Otherwise the circle contains zero, and everything below the edge is within the bound.
  *
  * @param {number} deg
  * @param {number} db
- * @param {number} reach 3σ/|value|
+ * @param {number} reach bound/|value|
  * @param {number} count
  * @returns {[deg: number, db: number][]}
  */

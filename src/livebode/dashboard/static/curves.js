@@ -9,7 +9,7 @@ import { halfDeg, highDb, lowDb, REFERENCES } from "./frames.js";
 
 /**
  * A curve at its own frequencies, in the displayed quantity, before any option of the view is applied. `reach` is
- * 3σ/|value|, `noise` the same of the noise alone, `index` the place of each frequency in the grid.
+ * bound/|value| (95 %), `noise` the same of the noise alone, `index` the place of each frequency in the grid.
  *
  * @typedef {object} Curve
  * @property {Frame | null} frame null where it is computed from others
@@ -49,21 +49,21 @@ export function curveOf(frame, lines, grid, at) {
 }
 
 /**
- * A curve as complex numbers with their standard deviation.
+ * A curve as complex numbers with their bound.
  *
  * @param {Curve} curve
  */
 export function complex({ db, deg, reach }) {
   const count = db.length,
-    [re, im, sigma] = [new Float64Array(count), new Float64Array(count), new Float64Array(count)];
+    [re, im, radius] = [new Float64Array(count), new Float64Array(count), new Float64Array(count)];
   for (let i = 0; i < count; i++) {
     const size = 10 ** (db[i] / 20),
       angle = (deg[i] * Math.PI) / 180;
     re[i] = size * Math.cos(angle);
     im[i] = size * Math.sin(angle);
-    sigma[i] = (size * reach[i]) / 3;
+    radius[i] = size * reach[i];
   }
-  return { re, im, sigma };
+  return { re, im, radius };
 }
 
 /** @typedef {ReturnType<typeof overGrid>} Drawn */

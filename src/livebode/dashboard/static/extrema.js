@@ -32,7 +32,7 @@ export function next(hz, db, reach, from, right) {
  *
  * @param {number[]} hz
  * @param {Numbers} db
- * @param {Numbers} reach 3σ/|value|; NaN where there is none
+ * @param {Numbers} reach bound/|value|; NaN where there is none
  * @param {boolean} peak
  * @returns {Omit<Extremum, "of">[]}
  */

@@ -80,7 +80,7 @@ export function curveIn(buffer) {
   throw new Error("the answer has no curve");
 }
 
-// Edges of the band of ±3σ around a magnitude in dB or a phase in degrees; see frames.py.
+// Edges of the 95 % bound around a magnitude in dB or a phase in degrees; see frames.py.
 const FLOOR_DB = -1000;
 /**
  * @param {number} db
@@ -94,9 +94,3 @@ export const lowDb = (db, reach) => (reach < 1 ? db + 20 * Math.log10(1 - reach)
 export const highDb = (db, reach) => db + 20 * Math.log10(1 + reach);
 /** @param {number} reach */
 export const halfDeg = (reach) => (reach < 1 ? (180 / Math.PI) * Math.asin(reach) : reach >= 1 ? 180 : NaN);
-/**
- * The probability that the band covers the true value: |error|²/σ² follows F(2, 2·dof).
- *
- * @param {number} dof
- */
-export const holds = (dof) => (Number.isFinite(dof) ? 1 - (1 + 9 / dof) ** -dof : 1 - Math.exp(-9));

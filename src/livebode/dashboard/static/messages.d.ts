@@ -370,6 +370,15 @@ export interface Page {
   silence?: number;
 }
 
+/** Called once, with a place above the list of runs; the answer is called whenever the list or the choice changes. */
+export type Workspace = (place: HTMLElement) => (list: {
+  directory: string;
+  /** "operator" may change something; "viewer". */
+  role: string;
+  runs: ReadonlyMap<string, import("./runs_feed.js").RunRow>;
+  chosen: ReadonlySet<string>;
+}) => void;
+
 declare global {
   interface Window {
     /** The parts of the page, for tests and for a person at the console of the browser. */

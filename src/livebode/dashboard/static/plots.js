@@ -31,7 +31,7 @@ export function plots(page, { bode, tracking, map }) {
     const common = { note: `livebode ${facts?.begun ? facts.version : ""}`, legend: () => [] };
     if (name === "tracking") {
       const tracked = tr("tracking"),
-        some = tr("{count} of {lines} lines, bands are ±3σ", { count: tracking.chosen.length, lines: count });
+        some = tr("{count} of {lines} lines, bounds: 95 %", { count: tracking.chosen.length, lines: count });
       return {
         ...common,
         title: `${of}, ${tracked}`,
@@ -51,7 +51,7 @@ export function plots(page, { bode, tracking, map }) {
     const place = frame?.schedule[0] ?? NaN,
       scheduled = page.schedule.name || tr("schedule"),
       over = Number.isFinite(place) ? ` · ${scheduled} ${fixed(place, 3)} ${page.schedule.unit}` : "";
-    const at = tr("at {time}, bands are ±3σ", { time: moment(frame?.timeS[0], true) });
+    const at = tr("at {time}, bounds: 95 %", { time: moment(frame?.timeS[0], true) });
     return {
       ...common,
       title: [of, bode.plane?.title, bode.view.words].filter(Boolean).join(", "),

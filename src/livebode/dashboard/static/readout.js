@@ -2,7 +2,7 @@
 // The values at the cursor, their bounds and distances from the measured curve; what lies between the fixed cursors.
 import { moment } from "./clock.js";
 import { differences } from "./cursors.js";
-import { halfDeg, highDb, holds, lowDb } from "./frames.js";
+import { halfDeg, highDb, lowDb } from "./frames.js";
 import { tr } from "./language.js";
 import { element } from "./make.js";
 import { nameOf } from "./names.js";
@@ -43,13 +43,6 @@ function fitted({ measured, model }) {
   const timeS = model?.frame?.timeS[0];
   if (timeS === undefined || timeS === measured?.frame?.timeS[0]) return "";
   return tr("fitted model at {time}", { time: moment(timeS, true) });
-}
-
-/** @param {Frame} frame */
-function bands(frame) {
-  const [dof] = frame.dof;
-  if (Number.isNaN(dof)) return tr("bands are ±3σ");
-  return tr("bands are ±3σ and cover the true value with {percent} %", { percent: fixed(100 * holds(dof), 2) });
 }
 
 /**
@@ -141,9 +134,9 @@ export function readout(host, hz, found, schedule, bode) {
   const rows = rowsOf(found, bode);
   const frame = found.measured?.frame;
   const words = bode.operation
-    ? tr("bands are ±3σ; the errors of A and B are taken as independent")
+    ? tr("bounds: 95 %; the errors of A and B are taken as independent")
     : frame
-      ? [where(frame, schedule), fitted(found), bands(frame)].filter(Boolean).join("; ")
+      ? [tr("{where}; bounds: 95 %", { where: where(frame, schedule) }), fitted(found)].filter(Boolean).join("; ")
       : tr("no response yet");
   host.replaceChildren(
     element(

@@ -64,7 +64,7 @@ export function table(bode) {
   const dialog = $("table", HTMLDialogElement);
   return () => {
     const frame = bode.curves.measured?.frame;
-    const words = frame ? tr("at {time}, bands are ±3σ", { time: moment(frame.timeS[0], true) }) : "";
+    const words = frame ? tr("at {time}, bounds: 95 %", { time: moment(frame.timeS[0], true) }) : "";
     $("table-values").replaceChildren(element("caption", {}, `${bode.symbol} ${words}`), ...filled(bode));
     if (!dialog.open) dialog.showModal();
   };

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import nan
 
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Block, Channel, QuantityKind, SourceError
+from livebode.core import Block, Channel, SourceError
 from livebode.sources.live.position import Mark, Origin
+from livebode.sources.quantities import Quantities, in_si
 
 CHANNELS_MAX = 1024
 VALUES_MAX = 1 << 20
@@ -86,9 +86,10 @@ class Batch:
     def nbytes(self) -> int:
         return int(self.data.nbytes)
 
-    def with_kinds(self, kinds: Mapping[str, QuantityKind]) -> Batch:
-        """The same with the declared kinds of its channels."""
-        return replace(self, channels=with_kinds(self.channels, kinds)) if kinds else self
+    def in_si(self, quantities: Quantities) -> Batch:
+        """The same in SI units, from those of the sender."""
+        channels = quantities.of(self.channels)
+        return self if channels == self.channels else replace(self, data=in_si(self.data, channels), channels=channels)
 
     def block(self, number: int, start: int, gap: bool) -> LiveBlock:
         """The samples from the sender's number `start` on, as a Block that begins at `number`."""
@@ -96,11 +97,6 @@ class Batch:
         return LiveBlock(
             data, self.channels, self.rate_hz, start=number, gap=gap, arrived_s=self.arrived_s, origin=origin
         )
-
-
-def with_kinds(channels: tuple[Channel, ...], kinds: Mapping[str, QuantityKind]) -> tuple[Channel, ...]:
-    """The channels with the kinds that are declared for some of them, by name."""
-    return tuple(replace(channel, kind=kinds.get(channel.name, channel.kind)) for channel in channels)
 
 
 def check_numbers(first_sample: int, rate_hz: float, stamp_s: float | None) -> None:

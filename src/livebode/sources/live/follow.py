@@ -198,7 +198,7 @@ class FollowSource(LiveSource):
         try:
             given = self.settings
             rate_hz = given.rate_hz or self._sequencer.schema.rate_hz
-            log = open_log(path, rate_hz=rate_hz, time=given.time, dbc=given.dbc)
+            log = open_log(path, rate_hz=rate_hz, time=given.time, dbc=given.dbc).as_written()
             labels, mark = log.channels, FolderMark(path.name, checksum(path), seen, counted, log.timing is not None)
             self._announce(labels, log.rate_hz)
             held: Batch | None = None

@@ -23,6 +23,7 @@ from pydantic_core import PydanticCustomError
 from livebode.core import Channel, ClockKind, ConfigError, DeferredModel, QuantityKind, UsageError
 from livebode.locations import Location, Url, location
 from livebode.plugins import loaded, named
+from livebode.sources.quantities import Quantities
 from livebode.sources.units import split_unit
 
 LimitUnit = Literal["s", "samples", "periods"]
@@ -101,7 +102,7 @@ LocatedFile = Annotated[
 ]
 """A path or URL; as JSON without a secret in it."""
 LOG = {"log", "time", "rate_hz", "follow", "dbc"}
-EVERY = {"timeout_s", "kinds"}
+EVERY = {"timeout_s", "kinds", "units"}
 RECORDINGS_MAX = 1000
 """In one run."""
 PART = {"from_": "from", "to": "to", "skip_periods": "skip_periods"}
@@ -114,6 +115,10 @@ def _checked_limit(given: float | str) -> float | str:
 
 
 Limit = Annotated[float | Annotated[str, Field(json_schema_extra={"pattern": PATTERN})], AfterValidator(_checked_limit)]
+
+
+def _checked_units(units: dict[str, str]) -> dict[str, str]:
+    return dict(Quantities(units=units).units)
 
 
 class SourceKeys(DeferredModel):
@@ -154,9 +159,19 @@ class SourceKeys(DeferredModel):
         Number of batches by which a batch may be late (UDP, MQTT).
     sender
         The only permitted IP address of the sender (UDP). Default: any.
+    fields
+        Field of each channel in JSON that another program sends (UDP, TCP, MQTT, standard input), as a path:
+        { "u [N m]" = "drive.torque", "y [rad/s]" = "axes[0].vel" }. "samples[*].u" is each element of a list. Needs
+        rate_hz. Default: the sender writes frames or lines for livebode.
+    sample_field
+        Field that numbers the samples of such messages, so that losses are exact. Default: messages are counted.
     kinds
         Kind of quantity of channels whose unit does not show it, or shows another: { speed = "velocity" }. Default: by
-        the unit.
+        the unit, otherwise by the name.
+    units
+        What one unit of a channel is, where the source does not state it, or states one without an SI value, such as %,
+        counts or the A of a motor whose torque constant is known: { torque = "0.024 N m", position = "1/131072 rev",
+        iq = "0.35 N m", speed = "rpm" }. Samples are converted to SI units when they are read.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
@@ -175,7 +190,10 @@ class SourceKeys(DeferredModel):
     timeout_s: Annotated[float, Field(gt=0, le=1e6)] = 30.0
     reorder_batches: Annotated[int, Field(ge=0, le=256)] = 8
     sender: str | None = None
+    fields: dict[str, str] = {}
+    sample_field: str | None = None
     kinds: dict[str, QuantityKind] = {}
+    units: Annotated[dict[str, str], AfterValidator(_checked_units)] = {}
 
     @property
     def live(self) -> bool:

@@ -19,7 +19,7 @@ from livebode.core import Channel, Event, LivebodeError, SourceError, SpectraLay
 from livebode.language import Message
 from livebode.sources.live.address import Address
 from livebode.sources.live.backlog_cause import BacklogCause
-from livebode.sources.live.batch import LiveBlock, with_kinds
+from livebode.sources.live.batch import LiveBlock
 from livebode.sources.live.computer_clock import ClockReading, pause
 from livebode.sources.live.dropped import Dropped
 from livebode.sources.live.health import Health
@@ -33,11 +33,14 @@ from livebode.sources.live.settled import SettledDeliveries
 from livebode.sources.live.source_events import SourceEvents
 from livebode.sources.live.spectra_batch import AnyBatch
 from livebode.sources.live.unconfirmed import CONFIRMED
+from livebode.sources.quantities import Quantities
 
 TICK_S = 0.1
 """Longest time until a request to end is detected."""
 UNDECIDED_S_MAX = 2.0
 """Batches that are in doubt for so long while nothing arrives are acknowledged: the sender may not send more before."""
+UNUSABLE_MAX = 16
+"""Messages that cannot be used and are retained, so that a person can see what is wrong with them."""
 TOGETHER_S = 0.25
 """Longest machine time that is taken from the queue at once: what waits is cheaper together than batch by batch."""
 
@@ -61,6 +64,8 @@ class LiveSource(ABC):
         Whether the sender sends no more until more of what it sent is recorded.
     backlog_cause
         Why samples wait; its reader reports when it waits for its record.
+    retains_unusable
+        Whether messages that cannot be used are not reported, but what its reader wants to see.
     """
 
     format: ClassVar[str]
@@ -80,6 +85,7 @@ class LiveSource(ABC):
 
     def __init__(self, settings: SourceSettings, address: Address) -> None:
         self.settings, self.address = settings, address
+        self._quantities = Quantities(settings.kinds, settings.units)
         # Also of a source of another package: what is below "livebode" is in its log.
         self._logger = logging.getLogger(f"{__package__}.{type(self).__module__.rpartition('.')[2]}")
         self._events = SourceEvents(log=self._log)
@@ -110,6 +116,9 @@ class LiveSource(ABC):
         self._settled, self._taken_delivery = SettledDeliveries(), 0
         self.has_record = self.asks_commit = False
         self.backlog_cause = BacklogCause()
+        self.retains_unusable = False
+        self.unusable: deque[tuple[float, bytes]] = deque(maxlen=UNUSABLE_MAX)
+        """When each of the newest messages that cannot be used came, by `time.monotonic`, and its bytes."""
 
     @abstractmethod
     def _receive(self) -> bool:
@@ -238,7 +247,7 @@ class LiveSource(ABC):
                 self._raise_failure()
                 raise self._refused or self._silence(asked)
             self._take(TICK_S)
-        self._check_kinds()
+        self._check_declared()
         self._log(logging.INFO, f"{len(self.channels)} channels at {self.rate_hz:.9g} Hz")
         return self
 
@@ -356,10 +365,10 @@ class LiveSource(ABC):
             open_ = inf
         self._settled.read(int(min(self._taken_delivery, open_ - 1)), self._sequencer.number)
 
-    def _check_kinds(self) -> None:
-        """SourceError if a kind is declared for a channel that the stream does not have."""
+    def _check_declared(self) -> None:
+        """SourceError if a kind or a unit is declared for a channel that the stream does not have."""
         names = [channel.name for channel in self.channels]
-        for name in self.settings.kinds:
+        for name in self._quantities.names:
             if name not in names:
                 self.close()
                 raise channel_unknown(name, names)
@@ -419,7 +428,7 @@ class LiveSource(ABC):
     def _announce(self, channels: tuple[Channel, ...], rate_hz: float) -> None:
         """Set the channels of a record that continues; they are known before new samples arrive."""
         if self._resumed is not None:
-            self._sequencer.schema.announce(with_kinds(channels, self.settings.kinds), rate_hz)
+            self._sequencer.schema.announce(self._quantities.of(channels), rate_hz)
 
     def _lost_connection(self, why: str) -> None:
         if not self._outage:
@@ -429,15 +438,20 @@ class LiveSource(ABC):
             )
         self._connected, self._outage, self._trouble = False, True, why
 
-    def _malformed(self, why: object) -> None:
-        self._events.report("malformed", Message("{address}: {why}", address=self.address, why=why))
+    def _malformed(self, why: object, received: bytes = b"") -> None:
+        """What was received cannot be used."""
+        if received:
+            self.unusable.append((time.monotonic(), received))
         self._trouble = why
+        if self.retains_unusable:
+            return
+        self._events.report("malformed", Message("{address}: {why}", address=self.address, why=why))
 
     def _deliver(self, batch: AnyBatch, *, waits: bool | None = None) -> None:
         """Add a batch to the queue; `waits`: whether its sender can wait, where it is not the same for all batches."""
         now = time.monotonic()
         self.backlog_cause.take(self.waiting_s, now)
-        batch = batch.with_kinds(self.settings.kinds) if self.settings.kinds else batch
+        batch = batch.in_si(self._quantities)
         self._pauses.reset()
         latency = None
         if batch.stamp_s is not None:

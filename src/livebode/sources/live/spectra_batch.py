@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import nan
 
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Channel, QuantityKind, SourceError, Spectra, SpectraLayout, rms
-from livebode.sources.live.batch import VALUES_MAX, Batch, LiveBlock, check_numbers, with_kinds
+from livebode.core import Channel, SourceError, Spectra, SpectraLayout, rms
+from livebode.sources.live.batch import VALUES_MAX, Batch, LiveBlock, check_numbers
 from livebode.sources.live.position import Mark, Origin
+from livebode.sources.quantities import Quantities, in_si
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,12 +101,15 @@ class SpectraBatch:
     def nbytes(self) -> int:
         return int(self.sums.nbytes + self.values.nbytes + self.state.nbytes)
 
-    def with_kinds(self, kinds: Mapping[str, QuantityKind]) -> SpectraBatch:
-        """The same with the declared kinds of its channels."""
-        if not kinds:
+    def in_si(self, quantities: Quantities) -> SpectraBatch:
+        """The same in SI units, from those of the sender."""
+        layout = self.layout
+        signals, values = quantities.of(layout.signals), quantities.of(layout.values)
+        if (signals, values) == (layout.signals, layout.values):
             return self
-        signals, values = (with_kinds(part, kinds) for part in (self.layout.signals, self.layout.values))
-        return replace(self, layout=replace(self.layout, signals=signals, values=values))
+        subtracted = tuple(constant * channel.factor for constant, channel in zip(layout.subtracted, signals))
+        layout = replace(layout, signals=signals, values=values, subtracted=subtracted)
+        return replace(self, sums=in_si(self.sums, signals), values=in_si(self.values, values), layout=layout)
 
     def block(self, number: int, start: int, gap: bool) -> LiveSpectra:
         """Spectra from sample `start` of the sender, which gets the number `number`."""

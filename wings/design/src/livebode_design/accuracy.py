@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import ceil, inf, log, sqrt
+from math import ceil, inf, sqrt
 
 import numpy as np
 
 from livebode.arrays import Floats
-from livebode.core import UsageError
+from livebode.core import CIRCLE_FACTOR, UsageError
 from livebode.excitation import Waveform
 from livebode_design.machine import Machine
 
-HOLDING_95 = sqrt(log(20))
-"""Sigmas of a bound that covers 95 % of complex errors: 1 − exp(−c²) = 0.95."""
 COUNTS_MIN = 0.5
 """Amplitude below which a line alone does not move an encoder at standstill from one count to the next."""
 
@@ -43,15 +41,15 @@ class LineAccuracy:
                 argument="accuracy",
                 value=accuracy,
             )
-        return max(1, ceil((HOLDING_95 * float(self.relative.max()) / accuracy) ** 2 - 1e-9))
+        return max(1, ceil((CIRCLE_FACTOR * float(self.relative.max()) / accuracy) ** 2 - 1e-9))
 
     def reached(self, windows: int) -> Floats:
         """The 95 % bound of each line after this number of windows, as a share of |G|."""
-        return np.asarray(HOLDING_95 * self.relative / sqrt(windows))
+        return np.asarray(CIRCLE_FACTOR * self.relative / sqrt(windows))
 
     def factor_for(self, accuracy: float) -> float:
         """Factor on the excitation that reaches this accuracy in one window; 0 without noise."""
-        return HOLDING_95 * float(self.relative.max()) / accuracy
+        return CIRCLE_FACTOR * float(self.relative.max()) / accuracy
 
 
 def accuracy_of(waveform: Waveform, machine: Machine) -> LineAccuracy:

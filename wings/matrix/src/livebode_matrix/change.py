@@ -8,16 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Floats
-from livebode.core import FitError, GridError, MatrixResponses, needing, widened
+from livebode.core import CIRCLE_FACTOR, FitError, GridError, MatrixResponses, needing, widened
 from livebode.fitting import mean_matrix
 from livebode.language import Message
 from livebode_matrix.line_correlation import INDEPENDENT, LineCorrelation, RowSteps
 
 ALPHA = 0.01
 """Probability of a change reported where there is none."""
-
-_LINE = 2.0
-"""Radius factor of a bound of a line: 98 %."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +28,7 @@ class EntryChange:
     frequency_hz
         The line with the largest difference in units of its bound.
     share, bound
-        |difference| over |response before| at that line, and its 98 % bound.
+        |difference| over |response before| at that line, and its 95 % bound.
     """
 
     output: str
@@ -259,7 +256,7 @@ class MatrixPair:
     @property
     def _radius(self) -> Floats:
         """Bound of each difference."""
-        return np.asarray(widened(self.sigma, np.full((1, 1, 1), self.dof), _LINE))
+        return np.asarray(widened(self.sigma, np.full((1, 1, 1), self.dof), CIRCLE_FACTOR))
 
 
 def _wilks(difference: Complex, noise: Complex, spread: Complex, dof: float) -> Floats:

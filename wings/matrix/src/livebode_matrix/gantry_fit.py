@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from livebode.arrays import Complex, Floats
-from livebode.core import MatrixResponses, UsageError, needing, normal_quantile
+from livebode.core import COVERAGE, MatrixResponses, UsageError, needing, normal_quantile
 from livebode.language import Message
 from livebode.simulation import Gantry
 from livebode_matrix.least_squares import minimise
@@ -68,15 +68,15 @@ class GantryFit:
     def __getitem__(self, name: str) -> float:
         return float(self.value[_at(name)])
 
-    def bound(self, name: str, probability: float = 0.95) -> float:
+    def bound(self, name: str, probability: float = COVERAGE) -> float:
         """Half-width of its interval."""
         return float(self.bounds(probability)[_at(name)])
 
-    def bounds(self, probability: float = 0.95) -> Floats:
+    def bounds(self, probability: float = COVERAGE) -> Floats:
         """Half-widths of all, shape (11,)."""
         return np.asarray(np.sqrt(np.diag(self.covariance)) * normal_quantile(0.5 + probability / 2))
 
-    def rows(self, probability: float = 0.95) -> list[tuple[str, float, float, str]]:
+    def rows(self, probability: float = COVERAGE) -> list[tuple[str, float, float, str]]:
         """Name, value, half-width and unit of all parameters."""
         bounds = self.bounds(probability)
         return [(name, float(v), float(b), unit) for (name, unit), v, b in zip(PARAMETERS, self.value, bounds)]

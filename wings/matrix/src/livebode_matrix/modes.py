@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Floats
-from livebode.core import FitError, MatrixResponses, Parameters, Responses
+from livebode.core import COVERAGE, FitError, MatrixResponses, Parameters, Responses
 from livebode.fitting import (
     CommonPoles,
     Hold,
@@ -143,7 +143,7 @@ class MatrixModes(CommonPoles):
 
         return self.parameters.derived(tuple(shown), tuple(units), of)
 
-    def rows(self, probability: float = 0.95) -> list[tuple[str, float, float, str]]:
+    def rows(self, probability: float = COVERAGE) -> list[tuple[str, float, float, str]]:
         """Name, value, half-width and unit of all quantities, mode shapes last."""
         own = super().rows(probability)
         if self.status != "ok" or not len(self.residues):

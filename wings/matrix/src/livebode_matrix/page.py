@@ -13,8 +13,6 @@ from livebode.core import REASONS, RecordError
 from livebode.dashboard import Answer, ShownRun, moment
 from livebode.language import Message
 
-_SIGMAS = 3.0  # of the bounds, as of all curves of the page
-
 
 class MatrixPage:
     """The matrix beside the plot of an entry."""
@@ -29,16 +27,16 @@ class MatrixPage:
 def matrix_answer(run: ShownRun, asked: Mapping[str, str]) -> dict[str, Any]:
     """The newest matrix of the run that the axis is an entry of, or the one nearest to a time, as plain data.
 
-    What is not known is None. `reach` is 3σ/|G|; `reasons` has for each input the number of lines at which its column
-    is invalid, by reason.
+    What is not known is None. `reach` is the 95 % bound over |G|; `reasons` has for each input the number of lines at
+    which its column is invalid, by reason.
     """
     group, units = run.group, run.units
     if group is None:
         raise RecordError("no-matrix", "this run has one response and no matrix", Message("reload the page"))
     matrix = group.at(run.past.directory, run.past.readable, moment(asked))[-1:]
-    value, sigma = matrix.value[0], matrix.sigma[0]
+    value = matrix.value[0]
     with np.errstate(divide="ignore", invalid="ignore"):
-        level, reach = 20 * np.log10(np.abs(value)), _SIGMAS * sigma / np.abs(value)
+        level, reach = 20 * np.log10(np.abs(value)), matrix.bound()[0] / np.abs(value)
         singular = 20 * np.log10(matrix.singular_values[0])
 
     def entry(o: int, i: int) -> dict[str, Any]:

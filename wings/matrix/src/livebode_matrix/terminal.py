@@ -55,7 +55,7 @@ def matrix_lines(newest: MatrixResponses) -> list[str]:
                 continue
             size = abs(entry.value[-1, valid])
             peak_index = int(size.argmax())
-            bound = entry.bound(2.0)[-1, valid][peak_index]
+            bound = entry.bound()[-1, valid][peak_index]
             around = f" ± {bound:.2g}" if bound == bound else ", bound not known yet"
             peak = f"largest {size[peak_index]:.4g}{around} at {entry.lines.frequency_hz[valid][peak_index]:g} Hz"
             lines.append(f"{name}  valid at {valid.sum()} of {valid.size} lines, {peak}")

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from livebode.arrays import Floats
+from livebode.core import INTERVAL_FACTOR
 from livebode.language import numerals, tr, trn
 from livebode.pictures import (
     Style,
@@ -32,7 +33,6 @@ if TYPE_CHECKING:
 
 CURVES_MAX = 10
 """Most modes in a picture: those that were found in most windows."""
-_C = 1.96
 _REACH = 4.0  # times the range of 90 % of the values: one wide bound must not flatten the rest
 
 
@@ -95,7 +95,7 @@ def _panels(upper: Axes, lower: Axes, look: Style, curves: Sequence[ModeCurve]) 
 
 
 def _line(axes: Axes, time_s: Floats, value: Floats, sigma: Floats, colour: str, *, dashed: bool = False) -> None:
-    bound = _C * sigma
+    bound = INTERVAL_FACTOR * sigma
     times, (middle, low, high) = with_holes(time_s, [x[:, np.newaxis] for x in (value, value - bound, value + bound)])
     axes.fill_between(times, low[:, 0], high[:, 0], color=colour, alpha=0.22, linewidth=0, gid="bound")
     axes.plot(times, middle[:, 0], color=colour, linewidth=1.3, linestyle="--" if dashed else "-", gid="value")
@@ -110,7 +110,7 @@ def _limits(axes: Axes, drawn: Sequence[tuple[Floats, Floats]]) -> None:
     value, sigma = (np.concatenate(part) if drawn else np.zeros(0) for part in zip(*drawn)) if drawn else (None, None)
     if value is None or sigma is None or not (known := np.isfinite(value) & np.isfinite(sigma)).any():
         return
-    value, half = value[known], _C * sigma[known]
+    value, half = value[known], INTERVAL_FACTOR * sigma[known]
     low, high = np.quantile(value, [0.02, 0.98])
     reach = _REACH * max(float(np.median(half)), 0.02 * float(high - low), 1e-3 * float(abs(high)))
     axes.set_ylim(max(float((value - half).min()), low - reach), min(float((value + half).max()), high + reach))

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from livebode.cli import can_draw, is_terminal, one_drawing_at_a_time, print_drawn, tell_how_to_draw
-from livebode.core import counted
+from livebode.core import INTERVAL_FACTOR, counted
 from livebode.locations import original
 from livebode.pictures import Canvas, Scale, clock, linear_ticks, written
 from livebode.runtime import Outcome
@@ -155,9 +155,10 @@ def _no_mode(window_s: float) -> str:
 
 def _mode(track: dict[str, Any]) -> str:
     newest = track["newest"]
+    half_hz, half = (INTERVAL_FACTOR * newest[name] for name in ("frequency_hz_sigma", "damping_sigma"))
     return (
-        f"{track['name']}: {newest['frequency_hz']:.5g} ± {1.96 * newest['frequency_hz_sigma']:.2g} Hz, damping "
-        f"{100 * newest['damping']:.3g} ± {100 * 1.96 * newest['damping_sigma']:.2g} %, "
+        f"{track['name']}: {newest['frequency_hz']:.5g} ± {half_hz:.2g} Hz, damping "
+        f"{100 * newest['damping']:.3g} ± {100 * half:.2g} %, "
         f"{100 * newest['share']:.0f} % of the power (newest); {_range(track)}"
     )
 

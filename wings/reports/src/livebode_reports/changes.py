@@ -9,7 +9,7 @@ import numpy as np
 
 from livebode.analysis import Margins, OpenLoop, against_lines, fit_averaged, margins
 from livebode.configuration import FitSection, LoopSection, recorded_configuration
-from livebode.core import LivebodeError, normal_quantile
+from livebode.core import INTERVAL_FACTOR, LivebodeError, normal_quantile
 from livebode.fitting import Fit
 from livebode.language import Message
 from livebode_reports.difference import ALPHA, RunDifferences
@@ -122,8 +122,7 @@ def _rows(fitted: Margins) -> dict[str, tuple[float, float, str]]:
 def _table(rows: list[dict[str, tuple[float, float, str]]]) -> tuple[QuantityChange, ...]:
     before, after = rows
     names = [name for name in before if name in after]
-    # The bounds of each are 1.96 sigma.
-    usual = normal_quantile(1 - ALPHA / 2)
+    usual = INTERVAL_FACTOR
     wider = normal_quantile(1 - ALPHA / (2 * max(len(names), 1))) / usual
     surer = wider + normal_quantile(0.95) / usual
     return tuple(

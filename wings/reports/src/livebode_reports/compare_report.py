@@ -26,7 +26,7 @@ from livebode_reports.difference import ALPHA, Difference, RunDifferences, compa
 from livebode_reports.kinds import rule_of
 from livebode_reports.limits import limits
 from livebode_reports.report_data import entry_title, read, written
-from livebode_reports.wording import BOUND_95, decibels, pairs, polar, polar_phrase, signed
+from livebode_reports.wording import decibels, pairs, polar, polar_phrase, signed
 
 TONES_OF_A_COMPARISON = {**TONES, "ok": Message("no difference shown")}
 _LINES_SHOWN, _PLACES_SHOWN = 80, 40
@@ -204,7 +204,7 @@ class Comparison:
     def response(self) -> Section:
         """Both responses and their ratio at each line."""
         d = self.differences.overall
-        radius = [r.bound(BOUND_95) for r in (d.before, d.after)]
+        radius = [r.bound() for r in (d.before, d.after)]
         rows = [
             (
                 number(f, "g"), *polar(complex(d.before.value[i]), float(radius[0][i]))[:2],

@@ -12,7 +12,6 @@ from livebode.core import Response, decibels
 from livebode.language import tr, trn
 from livebode.pictures import (
     FEW_LINES,
-    MEAN_C,
     Style,
     bound_db,
     bound_deg,
@@ -98,7 +97,7 @@ def _response(
 ) -> tuple[Floats, Floats]:
     """Draw magnitude and phase, and return them."""
     value = np.where(response.valid, response.value, np.nan)
-    radius = response.bound(MEAN_C)
+    radius = response.bound()
     (low, high), half = bound_db(value, radius), bound_deg(value, radius)
     db, deg = decibels(value), np.degrees(np.angle(value))
     deg = deg - 360 * np.rint((deg - turn) / 360)

@@ -35,8 +35,8 @@ from livebode_reports.events import EventSummary
 from livebode_reports.measurement_words import about_bounds, grid_rows, matrix_in_words, signal_rows
 from livebode_reports.report_data import Extent, RunData
 from livebode_reports.run_report import facts, not_judged, record_appendix
-from livebode_reports.verdict import about_record, by_urgency
-from livebode_reports.wording import BOUND_95, line_table, lines_of, pairs, polar, share
+from livebode_reports.verdict import about_record, by_urgency, of_measurement
+from livebode_reports.wording import line_table, lines_of, pairs, polar, share
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -93,7 +93,7 @@ _ACROSS, _DOWN = 3, 3  # Bode plots in one picture; more are illegible on a page
 def singular_values(of: MatrixReportData) -> Picture:
     """The picture of the first page."""
     caption = tr(
-        "Singular values of the newest matrix, with 99.7 % bounds: largest and smallest gain over all directions of "
+        "Singular values of the newest matrix, with 95 % bounds: largest and smallest gain over all directions of "
         "the inputs."
     )
     return Picture("singular values", {"responses": of.newest}, caption)
@@ -124,7 +124,7 @@ def bode(of: MatrixReportData) -> Section:
             block = newest.sel(output=newest.outputs[o : o + _DOWN], input=newest.inputs[i : i + _ACROSS])
             caption = tr(
                 "Bode plots of the newest matrix, at {time}: outputs down, inputs across, each entry with the bound "
-                "that covers it alone with 99.7 %.",
+                "that covers it alone with 95 %.",
                 time=moment(float(newest.time_s[0]), 2),
             )
             parts.append(Picture("matrix", {"responses": block}, caption))
@@ -161,7 +161,7 @@ def _entry_row(response: Responses, name: str, reason: np.ndarray) -> tuple[str,
         return (name, response.unit, f"{counted}: {why}", "—", "—", "—", "—", "—", "—")
     size, bound = (
         np.where(valid, np.abs(response.value[0]), np.nan),
-        np.where(valid, response.bound(BOUND_95)[0], np.nan),
+        np.where(valid, response.bound()[0], np.nan),
     )
     index = int(np.nanargmax(size))
     db, around, _, _ = polar(complex(response.value[0, index]), float(bound[index]))
@@ -186,7 +186,7 @@ def inputs(of: MatrixReportData) -> Section:
     )
     parts: list[Part] = [Paragraph(words)]
     parts += [Paragraph(f"{worded(sentence)}.") for sentence in newest.why(0)]
-    sizes, radius = newest.singular_values[0], newest.singular_value_bound(BOUND_95)[0]
+    sizes, radius = newest.singular_values[0], newest.singular_value_bound()[0]
     several = sizes.shape[1] > 1
     rows = [
         (
@@ -254,7 +254,7 @@ def matrix_report(
         If the logo cannot be used.
     """
     of = read_matrix(directory, header)
-    findings = by_urgency([*about_record(of), *about_columns(of.newest), about_responses(of)])
+    findings = by_urgency([*about_record(of), *of_measurement(about_columns(of.newest), [about_responses(of)])])
     title = of.header.machine or of.title
     parts: list[Section] = [
         how(of), bode(of), entries(of), inputs(of),

@@ -12,8 +12,6 @@ import tomli_w
 from livebode.core import PrintedTable, Response
 from livebode.language import number, tr, trn
 
-BOUND_95 = float(np.sqrt(np.log(20.0)))
-"""`Response.bound(BOUND_95)` covers the true value with 95 %."""
 _LINES_SHOWN = 120
 
 
@@ -92,9 +90,9 @@ def signed(number: str) -> str:
     return number if number.startswith(("-", "—")) else f"+{number}"
 
 
-def polar_rows(response: Response, c: float) -> list[tuple[str, str, str, str]]:
-    """`polar` of each line with `Response.bound(c)`."""
-    return [polar(complex(v), float(r)) for v, r in zip(response.value, response.bound(c))]
+def polar_rows(response: Response) -> list[tuple[str, str, str, str]]:
+    """`polar` of each line with its bound."""
+    return [polar(complex(v), float(r)) for v, r in zip(response.value, response.bound())]
 
 
 def pairs(rows: list[tuple[str, str]]) -> PrintedTable:

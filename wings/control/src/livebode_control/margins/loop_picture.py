@@ -10,7 +10,7 @@ import numpy as np
 
 from livebode.analysis import Margins, OpenLoop
 from livebode.arrays import Complex, Floats
-from livebode.core import Responses
+from livebode.core import INTERVAL_FACTOR, Responses
 from livebode.fitting import Fit
 from livebode.language import number, tr, worded
 from livebode.pictures import Style, drawing, heading, new_figure, plain, save, style
@@ -82,8 +82,8 @@ def _curves(loop_curves: LoopCurves, f: Floats) -> tuple[Complex, tuple[Floats, 
     drawn = np.random.default_rng(0).standard_normal((_DRAWS, len(size))) * np.sqrt(size.clip(0)) @ turned.T
     value = loop_curves.loop.at(values, f)[0]
     around = loop_curves.loop.at(values + drawn, f) / value
-    db = 1.96 * np.std(20 * np.log10(np.abs(around)), axis=0)
-    deg = 1.96 * np.std(np.degrees(np.angle(around)), axis=0)
+    db = INTERVAL_FACTOR * np.std(20 * np.log10(np.abs(around)), axis=0)
+    deg = INTERVAL_FACTOR * np.std(np.degrees(np.angle(around)), axis=0)
     middle_db, middle_deg = 20 * np.log10(np.abs(value)), _degrees(value)
     return value, (middle_db - db, middle_deg - deg), (middle_db + db, middle_deg + deg)
 
@@ -189,7 +189,7 @@ def _measured(curves: LoopCurves) -> tuple[Floats, Complex, Floats]:
     return (
         f,
         responses.value[0, use] * behind,
-        np.nan_to_num(responses.bound(np.sqrt(np.log(20)))[0, use]) * np.abs(behind),
+        np.nan_to_num(responses.bound()[0, use]) * np.abs(behind),
     )
 
 

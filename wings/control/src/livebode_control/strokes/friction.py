@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from livebode.arrays import Floats
+from livebode.core import COVERAGE
 from livebode.motion import FrictionCurve, friction_curve
 from livebode_control.strokes.motion_samples import MotionSamples
 
@@ -31,7 +32,7 @@ class FrictionReport:
     places: FrictionCurve | None
     strokes: MotionSamples
 
-    def each_way(self, probability: float = 0.95) -> dict[str, tuple[Floats, Floats]]:
+    def each_way(self, probability: float = COVERAGE) -> dict[str, tuple[Floats, Floats]]:
         """Coulomb and viscous friction forward and backward, with bounds, shape (2,) each."""
         return {name: self.directions.direction(sign, probability) for name, sign in (("forward", 1), ("backward", -1))}
 

@@ -96,6 +96,7 @@ def read_strokes(
         rate_hz=rate_hz or source.get("rate_hz"),
         time=time or source.get("time"),
         kinds=source.get("kinds"),
+        units=source.get("units"),
         dbc=source.get("dbc"),
         channels=[output],
     )

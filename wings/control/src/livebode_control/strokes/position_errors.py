@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Floats
-from livebode.core import widened
+from livebode.core import CIRCLE_FACTOR, widened
 from livebode.motion import AngleWindows, Shaft
 
 _STROKES_MIN = 5  # fewer give no usable scatter
@@ -41,7 +41,7 @@ class PositionErrors:
     dof: Floats
     seen: NDArray[np.bool_]
 
-    def bound(self, c: float = np.sqrt(np.log(20.0))) -> Floats:
+    def bound(self, c: float = CIRCLE_FACTOR) -> Floats:
         """Radius around the complex amplitude that covers the true one with probability 1 − exp(−c²); default: 95 %."""
         return widened(self.sigma, self.dof, float(c))
 

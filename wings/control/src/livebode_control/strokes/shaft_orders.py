@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Floats
-from livebode.core import widened
+from livebode.core import CIRCLE_FACTOR, widened
 from livebode.motion import AngleWindows, Shaft, usable_windows
 
 _STROKES_MIN = 4  # whose scatter is a bound
@@ -64,7 +64,7 @@ class ShaftOrders:
         """Phase of the cosine at angle 0, (orders,)."""
         return np.degrees(np.angle(self.value))
 
-    def bound(self, c: float = np.sqrt(np.log(20.0))) -> Floats:
+    def bound(self, c: float = CIRCLE_FACTOR) -> Floats:
         """Radius around the complex amplitude that covers the true one with probability 1 − exp(−c²); default: 95 %.
 
         Of torque and motion that are recorded at the same time; a delay between them adds `per_delay_s`·delay.

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Floats
-from livebode.core import Responses, TuneError
+from livebode.core import CIRCLE_FACTOR, Responses, TuneError
 from livebode_control.tuning.modal_fit import ModalFit
 
 _BETWEEN = 3  # points between neighbouring lines, or more
@@ -22,7 +22,6 @@ _LINES_MIN = 8
 _WIDTHS = np.tan(np.radians(np.arange(-80, 81, 10)))  # half-widths from a narrow mode: 20° of its circle each
 _FITTED = 2.5  # sigma of a fitted response
 _NOISE = 0.5  # of the radius: half of the difference of two parabolas through noise is below 0.28 of it
-_TO_95 = float(np.sqrt(np.log(20.0)))  # bound over sigma of circular normal noise
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +104,7 @@ class PlantBand:
                 dropped_hz=responses.lines.frequency_hz[~use].tolist(),
             )
         value = responses.value[:, use]
-        sigma = responses.bound(_TO_95)[:, use] / _TO_95
+        sigma = responses.bound()[:, use] / CIRCLE_FACTOR
         c = float(np.sqrt(np.log(value.size / (1 - confidence))))
         radius = responses.bound(c)[:, use]
         dropped = responses.lines.frequency_hz[~use]

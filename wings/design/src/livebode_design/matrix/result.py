@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 
 from livebode.arrays import Complex, Floats
+from livebode.core import CIRCLE_FACTOR
 from livebode.excitation import MatrixExcitation
 from livebode_design.matrix.machine import LimitedPeak, MatrixLimits, MatrixMachine
-from livebode_design.matrix.spec import HOLDING_95, MatrixSpec
+from livebode_design.matrix.spec import MatrixSpec
 
 
 @dataclass(frozen=True)
@@ -88,7 +89,7 @@ class MatrixDesign:
     @property
     def bound(self) -> Floats:
         """The 95 % bound of each entry as a share of the largest response of its output, shape of `sigma`."""
-        return np.asarray(HOLDING_95 * self.sigma / np.abs(self.response).max(axis=2, keepdims=True))
+        return np.asarray(CIRCLE_FACTOR * self.sigma / np.abs(self.response).max(axis=2, keepdims=True))
 
     @property
     def inputs(self) -> tuple[str, ...]:

@@ -11,7 +11,7 @@ from annotated_types import Ge, Gt, Le, MinLen
 from numpy.typing import NDArray
 
 from livebode.arrays import Floats
-from livebode.core import UsageError
+from livebode.core import CIRCLE_FACTOR, UsageError
 
 Kind = Literal["orthogonal", "interleaved", "successive"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
@@ -19,8 +19,6 @@ _Sigma = Annotated[float, Gt(0)]
 
 ACCURACY = 0.05
 """Default of `MatrixSpec.accuracy`, where neither another requirement nor a time is given."""
-HOLDING_95 = float(np.sqrt(np.log(20)))
-"""Sigmas of a bound that covers 95 % of complex errors: 1 − exp(−c²) = 0.95."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -108,7 +106,7 @@ class MatrixSpec:
         if self.sigma_max is None:
             share = self.accuracy or (1.0 if self.time_s is not None else ACCURACY)
             largest = np.abs(response).max(axis=2, keepdims=True)
-            return np.broadcast_to(share * largest / HOLDING_95, response.shape)
+            return np.broadcast_to(share * largest / CIRCLE_FACTOR, response.shape)
         rows = [self.sigma_max] if isinstance(self.sigma_max, (int, float)) else list(self.sigma_max)
         lengths = {np.size(row) for row in rows}
         given = np.asarray(rows if len(lengths) == 1 else [], dtype=np.float64)

@@ -199,7 +199,7 @@ class Matrix {
       element("table", { class: "entries" }, element("thead", {}, head), element("tbody", {}, ...rows)),
     );
     $("matrix-figures").replaceChildren(...figuresOf(answer));
-    $("matrix-about").textContent = tr("{rows} × {columns} at {time}; bounds ±3σ; a click shows the entry.", {
+    $("matrix-about").textContent = tr("{rows} × {columns} at {time}; bounds: 95 %; a click shows the entry.", {
       rows: outputs.length,
       columns: inputs.length,
       time: moment(answer.time_s),

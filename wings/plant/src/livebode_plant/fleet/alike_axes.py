@@ -70,6 +70,8 @@ class UsualSpectra(NamedTuple):
         tracker, layout = pipeline.follower, sequencer.schema.spectra
         if layout is None or len(blocks) != 1 or len(blocks[0]) != 1 or not sequencer.is_idle:
             return None
+        if any(channel.factor != 1 for channel in layout.channels):
+            return None
         if not isinstance(tracker, SpectraTracker) or tracker.kind is None or pipeline.readiness is not None:
             return None
         following, own = NextSpectrum(message, layout), blocks[0].origin

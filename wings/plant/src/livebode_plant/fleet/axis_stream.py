@@ -23,6 +23,7 @@ from livebode.language import Message
 from livebode.monitoring import places
 from livebode.preparation import live_follower
 from livebode.runtime import ChangeDetection, SingleResponse
+from livebode.sources import Quantities
 from livebode.sources.live import LiveBlock, Sequencer, SourceEvents, join_blocks
 from livebode_plant.fleet.alike_axes import (
     NO_ROWS,
@@ -100,6 +101,7 @@ class AxisStream(StatefulBase):
         self._limits = EventLimits()
         self._fit_period = 0
         settings = axis.source
+        self._quantities = Quantities(settings.kinds, settings.units)
         self._sequencer = Sequencer(self._events, reorder=settings.reorder_batches, rate_hz=settings.rate_hz)
         self._pipeline: SingleResponse | None = None
         self._added: list[_MessageGroup] = []
@@ -165,7 +167,7 @@ class AxisStream(StatefulBase):
             self._add_blocks(spectrum.position, spectrum.end, [self._block(spectrum)], self.usual.size_bytes)
 
     def _block(self, spectrum: PendingSpectrum) -> LiveBlock:
-        batch = read_message(spectrum.message, spectrum.log_s).with_kinds(self._axis.source.kinds)
+        batch = read_message(spectrum.message, spectrum.log_s).in_si(self._quantities)
         return batch.block(spectrum.number, spectrum.first_sample, False)
 
     def stacked(self) -> int:
@@ -269,7 +271,7 @@ class AxisStream(StatefulBase):
                 Message("message {log_message} of the log was dropped: {why}", log_message=self.position, why=error),
             )
             return blocks
-        return blocks + self._sequencer.push(batch.with_kinds(self._axis.source.kinds))
+        return blocks + self._sequencer.push(batch.in_si(self._quantities))
 
     def _output_bytes_max(self, blocks: list[LiveBlock]) -> int:
         """Most bytes of the responses that these Blocks complete; [motion] delays them by a chunk and a window."""

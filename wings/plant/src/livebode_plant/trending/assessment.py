@@ -9,7 +9,7 @@ from math import inf, isfinite, nan
 import numpy as np
 
 from livebode.arrays import Floats
-from livebode.core import needing
+from livebode.core import INTERVAL_FACTOR, needing
 from livebode_plant.trending.quantity_history import History, MachineHistory
 from livebode_plant.trending.robust_fit import rank_of, robust_fit
 from livebode_plant.trending.trend import NotAssessed, Trend
@@ -146,7 +146,6 @@ def silent_since(found: History) -> dict[str, float]:
 
 
 _RUNS_MIN = 8  # of each side
-_BOUND_95 = 1.959964
 
 
 @dataclass(frozen=True)
@@ -222,6 +221,6 @@ def _regressed(
 def _rows(side: MachineHistory, names: Sequence[str]) -> Floats:
     """Value, standard deviation and covariates of the runs that have them all."""
     covariates: Mapping[str, Floats] = side.covariates
-    sigma = np.where(np.isfinite(side.bound_95) & (side.bound_95 > 0), side.bound_95, 0.0) / _BOUND_95
+    sigma = np.where(np.isfinite(side.bound_95) & (side.bound_95 > 0), side.bound_95, 0.0) / INTERVAL_FACTOR
     rows = np.column_stack([side.value, sigma, *(covariates[name] for name in names)])
     return np.asarray(rows[np.isfinite(rows).all(axis=1)])

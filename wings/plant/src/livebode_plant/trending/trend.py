@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.arrays import Floats
+from livebode.core import INTERVAL_FACTOR
 from livebode.language import Message
 from livebode_plant.trending.changes import ChangeKind, Segmentation, segmentation
 from livebode_plant.trending.robust_fit import rank_of
@@ -19,7 +20,6 @@ YEAR_S = 12 * MONTH_S
 RUNS_MIN = 20
 SPAN_S_MIN = 28 * 86400.0
 _SEASON_S_MIN = 1.5 * YEAR_S  # below, a season of one year cannot be separated from a trend
-_BOUND_95 = 1.959964
 _WILD = 8.0  # interquartile ranges from the median: a failed sensor, which would move the whole regression
 _ALIKE = 0.95  # share of the time that the covariates explain, from which a warning is given
 _HEAD = 2  # columns for the constant and the time
@@ -202,7 +202,7 @@ def trend_of(
     if rank_of(terms) < terms.shape[1]:
         return NotAssessed(len(rows), Message("the covariates cannot be separated from each other or from the time"))
     bound = bound_95[rows]
-    sigma = np.where(np.isfinite(bound) & (bound > 0), bound, 0.0) / _BOUND_95
+    sigma = np.where(np.isfinite(bound) & (bound > 0), bound, 0.0) / INTERVAL_FACTOR
     segments = segmentation(month, terms, value[rows], sigma)
     remarks += _alike(terms, names)
     used = {name: usable[name][rows] for name in names}

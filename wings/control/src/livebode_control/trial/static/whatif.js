@@ -72,7 +72,7 @@ export function tried(curve, quantity, factor) {
  * @param {Numbers} hz
  * @param {Numbers} db
  * @param {Numbers} deg
- * @param {Numbers} reach 3σ/|L|, NaN where it is not known
+ * @param {Numbers} reach bound/|L|, NaN where it is not known
  * @returns {Margin[]}
  */
 export function marginsOf(hz, db, deg, reach) {
