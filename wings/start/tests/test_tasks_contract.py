@@ -161,7 +161,9 @@ def test_a_design_is_that_of_the_terminal_with_its_reasons_and_downloads(tab: Ta
     names = {path.name for path in (folder / "designs/excitation").iterdir()}
     assert {"excitation.csv", "excitation.wav", "excitation.h", "excitation.st"} < names
     for name in names:
-        assert (folder / "designs/excitation" / name).read_bytes() == (folder.parent / "design" / name).read_bytes(), name
+        assert (folder / "designs/excitation" / name).read_bytes() == (folder.parent / "design" / name).read_bytes(), (
+            name
+        )
         if name.endswith((".csv", ".wav", ".h", ".st")):
             with page.expect_download() as downloading:
                 page.click(f'a[download="{name}"]')

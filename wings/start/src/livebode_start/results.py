@@ -69,25 +69,17 @@ class Results:
 
     def _results(self, folder: str) -> Iterator[tuple[str, Path, list[str]]]:
         """Name, directory and files of each result."""
-        if not folder:
-            for run in _entries(self._directory):
-                place = self._directory / run.name
-                if run.is_dir(follow_symlinks=False) and is_run(place):
-                    files = [name for name in _files(place) if name in _REPORTS]
-                    if files:
-                        yield run.name, place, files
-        elif folder == "designs":
-            for design in _entries(self._directory / folder):
-                place = self._directory / folder / design.name
-                if design.is_dir(follow_symlinks=False) and _FACTS in (files := _files(place)):
-                    yield design.name, place, files
-        else:
-            stems: dict[str, list[str]] = {}
-            for name in _files(self._directory / folder):
-                if name.endswith(_ENDINGS[folder]):
-                    stems.setdefault(name.rpartition(".")[0], []).append(name)
-            for stem, files in stems.items():
-                yield stem, self._directory / folder, files
+        if folder in _ENDINGS:
+            yield from _by_stem(self._directory / folder, _ENDINGS[folder])
+            return
+        for place in _folders(self._directory / folder):
+            files = _files(place)
+            if not folder and is_run(place):
+                files = [name for name in files if name in _REPORTS]
+            elif not folder or _FACTS not in files:
+                continue
+            if files:
+                yield place.name, place, files
 
     @staticmethod
     def _row(name: str, place: Path, files: list[str]) -> dict[str, Any]:
@@ -109,6 +101,16 @@ def _choices(design: Path) -> list[list[str]]:
         return []
 
 
+def _by_stem(place: Path, endings: tuple[str, ...]) -> Iterator[tuple[str, Path, list[str]]]:
+    """The files of a directory with these endings, those of one name together."""
+    stems: dict[str, list[str]] = {}
+    for name in _files(place):
+        if name.endswith(endings):
+            stems.setdefault(name.rpartition(".")[0], []).append(name)
+    for stem, files in stems.items():
+        yield stem, place, files
+
+
 def _entries(folder: Path) -> list[os.DirEntry[str]]:
     """What is in a directory that is not a link, without hidden names; nothing if it is missing."""
     try:
@@ -122,3 +124,7 @@ def _entries(folder: Path) -> list[os.DirEntry[str]]:
 
 def _files(folder: Path) -> list[str]:
     return [entry.name for entry in _entries(folder) if entry.is_file(follow_symlinks=False)]
+
+
+def _folders(folder: Path) -> list[Path]:
+    return [folder / entry.name for entry in _entries(folder) if entry.is_dir(follow_symlinks=False)]

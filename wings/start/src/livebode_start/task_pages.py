@@ -62,7 +62,9 @@ class TaskPages:
         ]
 
     async def page(self, request: Request) -> Response:
-        return RedirectResponse("/login", 303) if self._board.access.role_of(request) is None else self._file("task.html")
+        return (
+            RedirectResponse("/login", 303) if self._board.access.role_of(request) is None else self._file("task.html")
+        )
 
     async def tasks(self, request: Request) -> Response:
         """The tasks that are offered, and the jobs that are remembered."""

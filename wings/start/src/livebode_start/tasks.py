@@ -100,9 +100,7 @@ def _options(request: TaskRequest, task: str) -> list[str]:
     """The filled fields of a task that are options, each as one word, so that no text becomes another option."""
     flags = {known.name for known in fields_of(task) if known.kind == "flag"}
     return [
-        name if name in flags else f"{name}={text}"
-        for name, text in request.values.items()
-        if name.startswith("--")
+        name if name in flags else f"{name}={text}" for name, text in request.values.items() if name.startswith("--")
     ]
 
 
@@ -119,9 +117,7 @@ def _learn(request: TaskRequest) -> JobOrder:
 def _compare(request: TaskRequest) -> JobOrder:
     place = f"comparisons/{file_name(request.name)}"
     words = ["compare", f"--out={place}", *_options(request, "compare"), *_positional(request.runs)]
-    return JobOrder(
-        "compare", tuple(words), (f"{place}.html", f"{place}.pdf"), lambda: _folder(request, "comparisons")
-    )
+    return JobOrder("compare", tuple(words), (f"{place}.html", f"{place}.pdf"), lambda: _folder(request, "comparisons"))
 
 
 def _report(request: TaskRequest) -> JobOrder:
@@ -180,9 +176,7 @@ def _folder(request: TaskRequest, name: str) -> None:
     with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
     if folder.is_symlink():
-        raise ServerError(
-            "file-unknown", f"{name!r} is a link, perhaps to another directory", "remove it", name=name
-        )
+        raise ServerError("file-unknown", f"{name!r} is a link, perhaps to another directory", "remove it", name=name)
 
 
 def _write_toml(request: TaskRequest, name: str, tables: Mapping[str, Any]) -> None:
@@ -201,7 +195,10 @@ TASKS: Mapping[str, Task] = {
     "report": Task("report", (1, 1), lambda: option_fields("report", [*FIRST_PAGE, "--appendix"]), _report),
     "design": Task(
         "design", (0, 1),
-        lambda: [*option_fields("design", _EXCITATION), *key_fields("experiment", (*_LIMITS, *_MEASURED, *_LOOP, *_BELT))],
+        lambda: [
+            *option_fields("design", _EXCITATION),
+            *key_fields("experiment", (*_LIMITS, *_MEASURED, *_LOOP, *_BELT)),
+        ],
         _design, "designs",
     ),
 }  # fmt: skip
