@@ -69,7 +69,7 @@ def write_configuration(
     source = {"log": _relative(place, out), "rate_hz": rate, "time": time, "dbc": dbc and _relative(dbc, out)}
     known = given | {"estimator": estimator, "average": average, "fit": fit}
     dialog = Dialog(proposals, {key: value for key, value in known.items() if value is not None}, console)
-    result = dialog.settled({key: value for key, value in source.items() if value is not None})
+    result = dialog.settled(source)
     for doubt in result.doubts:
         print(f"livebode: {doubt}", file=sys.stderr)
     with writing(out):
@@ -172,7 +172,7 @@ class Dialog:
 
     def _tables(self, source: Mapping[str, Any], signals: dict[str, str]) -> dict[str, dict[str, Any]]:
         from livebode.plugins import named
-        from livebode.preparation import suitable_estimator
+        from livebode.preparation import suitable_estimator, tables_of
 
         answers, console = self._answers, self._console
         if "estimator" not in answers:
@@ -183,10 +183,8 @@ class Dialog:
             answers["average"] = _agrees(console, "Average over all periods, for a standstill", still)
         if "fit" not in answers:
             answers["fit"] = _ask(console, "Model to fit to the responses", "none", ("none", "auto", *named("models")))
-        averages = answers["average"] and answers["estimator"] not in ("lpm", "welch")
-        tracking = {"estimator": answers["estimator"]} | ({"average": True} if averages else {})
-        fit = {} if answers["fit"] == "none" else {"fit": {"model": answers["fit"]}}
-        return {"source": dict(source), "signals": signals, "tracking": tracking} | fit
+        estimator, average, model = (answers[key] for key in ("estimator", "average", "fit"))
+        return tables_of(source, signals, estimator=estimator, average=average, model=model)
 
 
 def _channel(name: str | None) -> str | None:

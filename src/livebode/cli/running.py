@@ -18,7 +18,7 @@ import typer
 
 from livebode.cli import terminal
 from livebode.cli.failures import exit_code_of
-from livebode.cli.notices import NoticePrinter
+from livebode.cli.notices import NoticePrinter, PercentPrinter
 from livebode.cli.options import parsed_band
 from livebode.cli.pictures import draw, load_beside, tell_how_to_draw, tracked_amount
 from livebode.cli.remote import recorded_at
@@ -278,7 +278,8 @@ def _run(
 def _with_progress(job: Callable[[tuple[Subscriber, ...]], Outcome], quiet: bool) -> Outcome:
     """Run a job whose subscribers show notices and, on a terminal, a progress bar."""
     if quiet or not terminal.is_terminal(stderr=True):
-        return job((NoticePrinter(lambda message: _print_notice(terminal.console(stderr=True), message)),))
+        notices = NoticePrinter(lambda message: _print_notice(terminal.console(stderr=True), message))
+        return job((notices, PercentPrinter()) if terminal.prints_percent else (notices,))
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
     columns = (

@@ -21,6 +21,9 @@ def main() -> None:
     os.close(nothing)
     threading.Thread(target=_interrupt_at_end, args=(server,), daemon=True).start()
     from livebode.cli import main as run_command_line
+    from livebode.cli import print_percent
+
+    print_percent()
 
     sys.argv[0] = "livebode"  # as the help calls it
     run_command_line()

@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from livebode.core import ServerError, UsageError
 from livebode.language import Message, for_page
 from livebode.plugins import named
-from livebode.preparation import Proposals, Settled, chosen_part, settled, suitable_estimator, tables_of
+from livebode.preparation import Guess, Proposals, Settled, chosen_part, settled, suitable_estimator, tables_of
 from livebode.sources import Log, open_log
 from livebode_start.preview import Overview
 
@@ -137,20 +137,15 @@ class OpenedRecording:
             "models": ["none", "auto", *named("models")],
             "skipped": [[skipped.name, skipped.reason] for skipped in log.skipped[:_CHANNELS_MAX]],
             "roles": {
-                role: {"channel": guess.channel, "reason": for_page(guess.reason)}
+                role: {"channel": guess.channel, "reason": for_page(guess.reason), "others": list(guess.others)}
                 for role, guess in self.guesses.items()
             },
         }
 
     @cached_property
-    def guesses(self) -> dict[str, Any]:
+    def guesses(self) -> dict[str, Guess]:
         """The proposed channel of each role, or None, with the reason."""
-        taken: list[str] = []
-        roles: dict[str, Any] = {}
-        for role in ("excitation", "input", "output", "schedule"):
-            roles[role] = guess = self.proposals.of(role, taken)
-            taken += [guess.channel] if guess.channel else []
-        return roles
+        return self.proposals.roles()
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from livebode.language import Message
 from livebode.sources import open_file
 from livebode_start.workspace import Workspace, harmless_name
 
-UPLOAD_BYTES_MAX = 4 << 30
+UPLOAD_BYTES_MAX = 4_000_000_000
 """Largest recording."""
 RESERVE_BYTES = 256 << 20
 """Space of the disk that an upload leaves to runs and others."""

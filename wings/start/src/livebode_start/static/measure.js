@@ -133,6 +133,8 @@ function show(facts) {
 
   async function run() {
     measure.disabled = true;
+    $("ready").textContent = tr("Measuring …");
+    $("ready").className = "";
     try {
       const { job, run } = await post("/api/measure", choices());
       $("ready").hidden = measure.hidden = true;

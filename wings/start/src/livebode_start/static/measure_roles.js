@@ -5,7 +5,7 @@ import { element } from "./make.js";
 import { worded } from "./worded.js";
 
 /** @typedef {"excitation" | "input" | "output" | "schedule"} Role */
-/** @typedef {{channel: string | null, reason: import("./messages.js").Words}} Guess */
+/** @typedef {{channel: string | null, reason: import("./messages.js").Words, others: string[]}} Guess */
 /** @typedef {{name: string, unit: string, kind: string, constant: boolean, not_finite: number}} Channel */
 
 /** @type {Role[]} */
@@ -109,7 +109,13 @@ export class Roles {
       const guess = this.guesses[role],
         reason = this.reasons.get(role),
         own = (guess.channel ?? "") === select.value;
-      if (reason) reason.textContent = own ? worded(guess.reason) : tr("as chosen");
+      if (!reason) continue;
+      reason.textContent = own ? [worded(guess.reason), ...alternatives(guess)].join("; ") : tr("as chosen");
+      reason.classList.toggle("doubt", own && guess.others.length > 0);
     }
   }
 }
+
+/** @param {Guess} guess */
+const alternatives = ({ others }) =>
+  others.length ? [tr("{channels} also possible", { channels: others.join(tr(", ")) })] : [];

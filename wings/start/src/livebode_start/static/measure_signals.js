@@ -165,7 +165,7 @@ export class Signals {
         scales: { x: { time: false }, y: { range: (_u, low, high) => reach(low, high) } },
         axes: [
           axis(() => "", { size: 20, values: (_u, splits) => splits.map((s) => `${plain(s, 6)} s`) }),
-          axis(() => "", { size: 54, space: 22, values: (_u, splits) => splits.map((v) => plain(v, 4)) }),
+          axis(() => "", { size: 54, space: 16, values: (_u, splits) => splits.map((v) => plain(v, 4)) }),
         ],
         series: [{}, { label: "value", stroke: () => colour("measured"), width: 1, points: { show: false } }],
         hooks: { draw: [(u) => this.shade(u)] },
