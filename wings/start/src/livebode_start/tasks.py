@@ -5,6 +5,7 @@ A task starts a command by its name; one whose wing is not installed is not offe
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
@@ -111,13 +112,13 @@ def _positional(names: tuple[str, ...]) -> list[str]:
 def _learn(request: TaskRequest) -> JobOrder:
     place = f"baselines/{file_name(request.name)}.json"
     words = ["learn", f"--out={place}", *_options(request, "learn"), *_positional(request.runs)]
-    return JobOrder("learn", tuple(words), (place,), lambda: _folder(request, "baselines"))
+    return JobOrder("learn", tuple(words), lambda: _folder(request, "baselines"))
 
 
 def _compare(request: TaskRequest) -> JobOrder:
     place = f"comparisons/{file_name(request.name)}"
     words = ["compare", f"--out={place}", *_options(request, "compare"), *_positional(request.runs)]
-    return JobOrder("compare", tuple(words), (f"{place}.html", f"{place}.pdf"), lambda: _folder(request, "comparisons"))
+    return JobOrder("compare", tuple(words), lambda: _folder(request, "comparisons"))
 
 
 def _report(request: TaskRequest) -> JobOrder:
@@ -131,8 +132,7 @@ def _report(request: TaskRequest) -> JobOrder:
         if request.limits:
             _write_toml(request, template, {"report": {"limits": [_limit(row) for row in request.limits]}})
 
-    results = (f"{run}/report.html", f"{run}/report.pdf")
-    return JobOrder("report", (*words, *_positional(request.runs)), results, prepare)
+    return JobOrder("report", (*words, *_positional(request.runs)), prepare)
 
 
 @cache
@@ -168,7 +168,7 @@ def _design(request: TaskRequest) -> JobOrder:
         if not (request.directory / place).exists():  # else the command says so, and the earlier file remains
             _write_toml(request, described, tables)
 
-    return JobOrder("design", tuple(words), (place,), prepare)
+    return JobOrder("design", tuple(words), prepare)
 
 
 def _folder(request: TaskRequest, name: str) -> None:
@@ -202,6 +202,12 @@ TASKS: Mapping[str, Task] = {
         _design, "designs",
     ),
 }  # fmt: skip
+
+
+def texts() -> set[str]:
+    """Help and defaults of all fields that are words, which the page shows in its language."""
+    every = [*limit_fields(), *(known for name in TASKS for known in fields_of(name))]
+    return {text for known in every for text in (known.help, known.default) if re.search("[a-z]{3}", text)}
 
 
 def offered() -> list[str]:
