@@ -114,7 +114,11 @@ const nameOf = (job) => {
 };
 
 /** @param {string} word as a shell takes it */
-const quoted = (word) => (/^[\w./=:@%+,-]+$/.test(word) ? word : `'${word.replaceAll("'", `'\\''`)}'`);
+function quoted(word) {
+  if (/^[\w./=:@%+,-]+$/.test(word)) return word;
+  const inside = word.split("'").join("'\\''");
+  return `'${inside}'`;
+}
 
 /** @param {boolean} working */
 const busy = (working) => $("answer").setAttribute("aria-busy", String(working));
