@@ -32,6 +32,7 @@ GROUPS: Mapping[str, type[Mapping[str, Any]] | type[Sequence[Any]]] = {
     "examples": Mapping,
     "files": Mapping,
     "pages": Mapping,
+    "workspaces": Mapping,
 }
 """The groups, and the type of their tables; a mapping has the name of each part."""
 _OWN = "livebode"

@@ -97,7 +97,7 @@ def test_a_page_without_an_addition_that_cannot_be_loaded_has_the_others(monkeyp
     additions = dict(plugins.named("pages"))
     monkeypatch.setattr(plugin_pages, "named", lambda _: {"other": "livebode_absent.page:Addition"} | additions)
     with pytest.warns(plugins.PluginWarning, match="'other' is not on the page: livebode_absent.page:Addition"):
-        files = plugin_pages.files_of_additions()
+        files = plugin_pages.files_of_additions({})
     assert [name in files["additions.js"].decode() for name in ("whatIf", "other")] == [True, False]
 
 

@@ -41,3 +41,4 @@ from livebode.cli.start import main as main
 from livebode.cli.terminal import console as console
 from livebode.cli.terminal import is_terminal as is_terminal
 from livebode.cli.terminal import print_drawn as print_drawn
+from livebode.cli.terminal import print_percent as print_percent

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import sys
+import time
 from collections.abc import Callable
 
 from livebode.core import Event
-from livebode.runtime import Document
+from livebode.runtime import Document, TrackerResults
 
 _KINDS = {
     "roles-doubtful", "transient", "outlying-periods", "phase-slip", "phase-slips", "restart", "replaced",
     "computer-clock", "foreign", "backlog", "backlog-cleared", "waiting", "window-doubtful",
     "drift", "not-periodic", "distortion-levels", "best-linear-approximation", "recordings-differ",
-    "uneven-clock", "suppressed", "sink-down", "sink-up", "sink-full", "sink-refused",
+    "uneven-clock", "long-recording", "suppressed", "sink-down", "sink-up", "sink-full", "sink-refused",
 }  # fmt: skip
 _ONCE = {"foreign", "suppressed"}
+_PERCENT_EVERY_S = 0.2
 
 
 class NoticePrinter:
@@ -32,3 +35,18 @@ class NoticePrinter:
         if document.kind in _KINDS or document.kind.startswith("record-"):
             self._shown.add(document.kind)
             self._show(document.message)
+
+
+class PercentPrinter:
+    """A subscriber that prints how far a run is, for a program that reads it: a line for each percent, a few a second."""
+
+    def __init__(self) -> None:
+        self._percent, self._printed_s = -1, float("-inf")
+
+    def __call__(self, document: Document) -> None:
+        if not isinstance(document, TrackerResults) or not document.samples_total:
+            return
+        percent = 100 * document.samples // document.samples_total
+        if percent > self._percent and time.monotonic() - self._printed_s > _PERCENT_EVERY_S:
+            self._percent, self._printed_s = percent, time.monotonic()
+            print(f"livebode: {percent} % of {document.samples_total} samples", file=sys.stderr, flush=True)

@@ -1,5 +1,7 @@
 """The entry point: version and first page of help at once, everything else by the application.
 
+Without words a person at a terminal gets the start page in the browser, and a script the help.
+
 Typer and Rich alone take ten times as long to load as Python takes to start.
 """
 
@@ -28,8 +30,11 @@ def main() -> None:
         return
     if words in (["--help"], ["-h"]) and _printed(_help()):
         return
-    if not words and _COMPLETION not in os.environ and _printed(_help()):
-        sys.exit(_USAGE_ERROR)
+    if not words and _COMPLETION not in os.environ:
+        if _has_start_page():
+            sys.argv.append("view")
+        elif _printed(_help()):
+            sys.exit(_USAGE_ERROR)
     gc.set_threshold(OBJECTS_NEW)
     atexit.register(_leave_cycles)
     try:
@@ -38,6 +43,17 @@ def main() -> None:
         print("livebode: stopped; nothing was written", file=sys.stderr)
         sys.exit(_INTERRUPTED)
     run_application()
+
+
+def _has_start_page() -> bool:
+    """Whether somebody is at a terminal, and what serves and shows the page is installed."""
+    if not sys.stdout.isatty():
+        return False
+    from importlib.util import find_spec
+
+    from livebode.plugins import plugins
+
+    return bool(plugins("workspaces")) and all(find_spec(name) for name in ("starlette", "uvicorn", "websockets"))
 
 
 def _help() -> str:

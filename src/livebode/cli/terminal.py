@@ -43,6 +43,16 @@ class VisibleText(io.TextIOWrapper):
         return False
 
 
+prints_percent = False
+"""Whether a run prints how far it is as lines, where there is no terminal for a bar."""
+
+
+def print_percent() -> None:
+    """Print from now on how far a run is as lines, "livebode: 42 % of 80000 samples": for a program that reads them."""
+    global prints_percent
+    prints_percent = True
+
+
 def protect() -> None:
     """Make standard output and standard error print control characters as escapes."""
     for name in ("stdout", "stderr"):

@@ -2,41 +2,82 @@
 
 from __future__ import annotations
 
+import os
+import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from livebode.cli.options import Port, ServeFile
+from livebode.cli.terminal import is_terminal
 from livebode.locations import location
+
+if TYPE_CHECKING:
+    from livebode.configuration import ServeSection
+
+_DISPLAYS = "DISPLAY", "WAYLAND_DISPLAY"
 
 
 def view_command(
     runs: Annotated[
-        list[Path],
+        list[Path] | None,
         typer.Argument(
             metavar="RUN...",
-            help="Run directories, also of runs that are still recording; or one directory that contains runs.",
+            help="Run directories, also of runs that are still recording; or one directory of runs, which may be empty "
+            "or missing. \\[default: runs]",
             parser=location,
         ),
-    ],
+    ] = None,
     port: Port = None,
     axis: ServeFile = None,
+    no_browser: Annotated[
+        bool, typer.Option("--no-browser", help="Do not open the page in the browser, as without a screen.")
+    ] = False,
 ) -> None:
     """Show runs in a browser as `livebode run --serve` does, until Ctrl-C; follow a run that is still recording.
 
-    Of a directory that contains runs, show a list of them, to search, tag, compare and delete, and their trends.
+    Of a directory of runs, show a list of them, to search, tag, compare and delete, and their trends; drop a recording
+    there to measure it. `livebode` alone shows the directory `runs`.
     """
     from livebode.cli.serving import dashboard_of, print_line, wait_for_the_end
     from livebode.configuration import ServeSection, read_serve_section
     from livebode.records import is_run
 
-    dashboard = dashboard_of(ServeSection() if axis is None else read_serve_section(axis), port)
-    if len(runs) == 1 and runs[0].is_dir() and not is_run(runs[0]):
+    runs = runs or [Path("runs")]
+    section = ServeSection() if axis is None else read_serve_section(axis)
+    if port is None and axis is None and _is_taken(section):
+        port = 0
+    dashboard = dashboard_of(section, port)
+    if len(runs) == 1 and not is_run(runs[0]) and (runs[0].is_dir() or not os.path.lexists(runs[0])):
         dashboard.view_all(runs[0])
     else:
         for run in runs:
             dashboard.view(run)
     with dashboard:
         print_line(f"the dashboard is at {dashboard.url}")
+        if not no_browser and _has_screen():
+            import webbrowser
+
+            webbrowser.open(dashboard.url)
         wait_for_the_end()
+
+
+def _is_taken(section: ServeSection) -> bool:
+    """Whether another program, such as the page of another directory, has the usual port."""
+    from livebode.core import ServerError
+    from livebode.dashboard import ServerSettings, listening
+
+    try:
+        listening(ServerSettings.of(section)).close()
+    except ServerError as error:
+        return error.code == "server.port-taken"
+    return False
+
+
+def _has_screen() -> bool:
+    """Whether a person is at this computer, and a browser would not open in the terminal."""
+    if not is_terminal(stderr=True):
+        return False
+    local = "SSH_CONNECTION" not in os.environ
+    return local if os.name == "nt" or sys.platform == "darwin" else any(os.environ.get(name) for name in _DISPLAYS)

@@ -14,6 +14,7 @@ from livebode.dashboard.browser_socket import BrowserSocket as BrowserSocket
 from livebode.dashboard.browser_socket import serve_browser as serve_browser
 from livebode.dashboard.dashboard import Dashboard as Dashboard
 from livebode.dashboard.dashboard import listening as listening
+from livebode.dashboard.guard import upload as upload
 from livebode.dashboard.hub import Hub as Hub
 from livebode.dashboard.overlays import grid_hz as grid_hz
 from livebode.dashboard.past import Past as Past
@@ -22,7 +23,9 @@ from livebode.dashboard.plugin_pages import Order as Order
 from livebode.dashboard.plugin_pages import PageAddition as PageAddition
 from livebode.dashboard.plugin_pages import PluginPages as PluginPages
 from livebode.dashboard.plugin_pages import ShownRun as ShownRun
+from livebode.dashboard.plugin_pages import WorkspacePages as WorkspacePages
 from livebode.dashboard.quantities import Quantities as Quantities
 from livebode.dashboard.queries import json_object as json_object
 from livebode.dashboard.queries import moment as moment
+from livebode.dashboard.run_catalogue import runs_in as runs_in
 from livebode.dashboard.server_settings import ServerSettings as ServerSettings

@@ -11,11 +11,14 @@ from collections import Counter, OrderedDict
 from collections.abc import Callable
 from http.cookies import CookieError, SimpleCookie
 from math import ceil
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from livebode.core import ServerError
 from livebode.dashboard.server_settings import ServerSettings
 from livebode.language import Message, for_page
+
+if TYPE_CHECKING:
+    from starlette.requests import HTTPConnection
 
 Role = Literal["operator", "viewer"]
 
@@ -107,6 +110,11 @@ class Access:
             if session in sessions and self._clock() < sessions[session][1]:
                 return self._limited(role)
         return None
+
+    def role_of(self, connection: HTTPConnection) -> Role | None:
+        """The role of who sent a request or opened a web socket; None without access, ServerError as above."""
+        headers, client = connection.headers, connection.client
+        return self.role(headers.get("cookie", ""), headers.get("authorization", ""), client.host if client else "")
 
     def _displace(self, sessions: dict[bytes, tuple[str, float]]) -> None:
         """Remove those that are over, else the oldest one of the address with the most.

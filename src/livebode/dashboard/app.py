@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import html
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any, get_args
@@ -24,9 +24,16 @@ from livebode.dashboard.alarm_requests import Act, alarm_request
 from livebode.dashboard.board import Board
 from livebode.dashboard.browser_socket import Client, serve_browser
 from livebode.dashboard.frames import frame
-from livebode.dashboard.guard import Guard, body
+from livebode.dashboard.guard import BODY_BYTES_MAX, Guard, body
 from livebode.dashboard.past import Past
-from livebode.dashboard.plugin_pages import Answer, PluginPages, ShownRun, files_of_additions, page_additions
+from livebode.dashboard.plugin_pages import (
+    Answer,
+    PluginPages,
+    ShownRun,
+    WorkspacePages,
+    files_of_additions,
+    page_additions,
+)
 from livebode.dashboard.queries import SavedChange
 from livebode.dashboard.runs_pages import RunsPages
 from livebode.dashboard.server_settings import ServerSettings
@@ -69,10 +76,18 @@ _TYPES = {"csv": "text/csv; charset=utf-8", "mat": "application/octet-stream"}
 
 
 def application(
-    board: Board, serving: ServerSettings, directory: Path | None = None, others: PluginPages | None = None
+    board: Board,
+    serving: ServerSettings,
+    directory: Path | None = None,
+    others: PluginPages | None = None,
+    workspaces: Mapping[str, WorkspacePages] | None = None,
 ) -> Guard:
-    """The ASGI application: the page of the board, of a plug-in, or of all runs of a directory, each with a board."""
-    pages = _Pages(board, serving, _files(others))
+    """The ASGI application: the page of the board, of a plug-in, or of all runs of a directory, each with a board.
+
+    `workspaces` are the pages of plug-ins beside the list of runs, by name.
+    """
+    workspaces = workspaces or {}
+    pages = _Pages(board, serving, _files(others, workspaces))
     routes: list[BaseRoute] = [
         Route("/login", pages.login_page, methods=["GET"]),
         Route("/login", pages.login, methods=["POST"]),
@@ -92,6 +107,7 @@ def application(
             pages.file,
             serving.language,
         ).routes
+        routes += [route for beside in workspaces.values() for route in beside.routes(board, pages.file, pages.order)]
     return Guard(_app(routes, serving.language), serving.names, serving.tls is not None)
 
 
@@ -123,7 +139,7 @@ class _Pages:
         self.files = files
 
     async def page(self, request: Request) -> Response:
-        if self._role(request) is None:
+        if self._board.access.role_of(request) is None:
             return RedirectResponse("/login", 303)
         return self.file("index.html")
 
@@ -173,12 +189,12 @@ class _Pages:
             return _unknown()
         span = queries.span(request.query_params, len(self._board.states))
         response = await self._board.elsewhere(Past.of(state).at, span.from_s)
-        data = state.frames_of("moment", response, span.quantity)
+        data = state.frames_at(response, span.quantity)
         return Response(data, media_type="application/octet-stream")
 
     async def signals(self, request: Request) -> Response:
         """Raw signals or their spectrum, live or at a time in the record."""
-        if self._role(request) is None:
+        if self._board.access.role_of(request) is None:
             return _unknown()
         asked = queries.signals_asked(request.query_params, len(self._board.states))
         answer = await signals(self._board, self._begun(asked.axis), asked)
@@ -252,14 +268,14 @@ class _Pages:
         job = applied(change, Past.of(state), state)
         return JSONResponse(listed(await self._board.elsewhere(change_saved, _directory(state), job)))
 
-    async def order(self, request: Request) -> bytes | Response:
-        """The JSON of an operator, or the answer to somebody else."""
-        role = self._role(request)
+    async def order(self, request: Request, bytes_max: int = BODY_BYTES_MAX) -> bytes | Response:
+        """The JSON of an operator, of at most so many bytes, or the answer to somebody else."""
+        role = self._board.access.role_of(request)
         if role is None:
             return _unknown()
         if role != "operator":
             return JSONResponse(error_answer(Message("this session is read-only")), 403)
-        data = await body(request)
+        data = await body(request, bytes_max)
         if data is None or request.headers.get("content-type", "").partition(";")[0] != "application/json":
             raise ServerError(
                 "request-malformed",
@@ -276,13 +292,9 @@ class _Pages:
         content, kind = self.files.get(name, (b"not found\n", ""))
         return Response(content, 200 if kind else 404, media_type=kind or "text/plain")
 
-    def _role(self, request: Request) -> str | None:
-        headers = request.headers
-        return self._board.access.role(headers.get("cookie", ""), headers.get("authorization", ""), _address(request))
-
     def _asked_state(self, request: Request) -> State | None:
         """The state of the axis of a query, if its run has started; None without access."""
-        if self._role(request) is None:
+        if self._board.access.role_of(request) is None:
             return None
         return self._begun(queries.span(request.query_params, len(self._board.states)).axis)
 
@@ -294,13 +306,13 @@ class _Pages:
         return state
 
 
-def _files(others: PluginPages | None) -> dict[str, tuple[bytes, str]]:
+def _files(others: PluginPages | None, workspaces: Mapping[str, WorkspacePages]) -> dict[str, tuple[bytes, str]]:
     """Content and type of the static files, in memory: reading a file would take a thread for each request."""
     folders = [(_HERE / "static", ""), (_HERE / "_vendor" / "uplot", "uplot/")]
     if others is not None:
         folders.append((others.static, ""))
     files = {prefix + path.name: path.read_bytes() for folder, prefix in folders for path in folder.iterdir()}
-    files |= files_of_additions()
+    files |= files_of_additions(workspaces)
     return {name: (content, kind) for name, content in files.items() if (kind := _FILE_TYPES.get(Path(name).suffix))}
 
 

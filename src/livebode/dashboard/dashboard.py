@@ -21,7 +21,7 @@ from livebode.dashboard.server_settings import ServerSettings
 from livebode.dashboard.state import State
 
 if TYPE_CHECKING:
-    from livebode.dashboard.plugin_pages import PluginPages
+    from livebode.dashboard.plugin_pages import PluginPages, WorkspacePages
 
 HEADER_BYTES_MAX = 16 << 10
 BACKLOG = 4096
@@ -59,6 +59,7 @@ class Dashboard:
         self._hubs: dict[str, Hub | MatrixHub] = {}
         self._runs: Path | None = None
         self._others: PluginPages | None = None
+        self._workspaces: dict[str, WorkspacePages] = {}
         self._server: Any = None
         self._thread: threading.Thread | None = None
         self._socket: socket.socket | None = None
@@ -97,14 +98,18 @@ class Dashboard:
     def view_all(self, directory: Path) -> None:
         """Show the list of all runs in a directory, instead of axes; each run is read when its page is opened.
 
+        Pages of plug-ins that work in a directory are beside the list; with them it may be empty or missing.
+
         Raises
         ------
         RecordError
-            If it contains no run.
+            If it contains no run, and no plug-in has pages that make one.
         """
+        from livebode.dashboard.plugin_pages import workspace_pages
         from livebode.dashboard.run_catalogue import runs_in
 
-        if not runs_in(directory):
+        self._workspaces = workspace_pages(directory)
+        if not self._workspaces and not runs_in(directory):
             raise RecordError(
                 "not-a-run",
                 f"{str(directory)!r} is not the directory of a run: it has no run.json, and no directory in it has one",
@@ -211,13 +216,17 @@ class Dashboard:
         self._faults = Faults(self._report)
         asyncio.get_running_loop().set_exception_handler(self._faults.handler)
         board = Board(self._states, self._viewed, Access(self._serving, self._report))
-        self._application = application(board, self._serving, self._runs, self._others)
-        beating = asyncio.create_task(board.run() if self._others is None else self._others.run())
-        beating.add_done_callback(self._stopped)
+        self._application = application(board, self._serving, self._runs, self._others, self._workspaces)
+        shown = board if self._others is None else self._others
+        beating = [asyncio.create_task(part.run()) for part in (shown, *self._workspaces.values())]
+        for task in beating:
+            task.add_done_callback(self._stopped)
         try:
             await self._server.serve()
         finally:
-            beating.cancel()
+            for task in beating:
+                task.cancel()
+            await asyncio.gather(*beating, return_exceptions=True)
             board.close()
 
     def _stopped(self, task: asyncio.Task[None]) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ipaddress
+from collections.abc import AsyncIterator
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -12,6 +13,8 @@ from starlette.responses import PlainTextResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 BODY_BYTES_MAX = 4096
+EXPECT_UPLOAD = "livebode.expect_upload"
+"""Key of the scope of a request: a function that gives a client its time for each part of the body."""
 _QUERY_MAX = 1024
 _YEAR_S = 365 * 86400
 _POLICY = (
@@ -109,6 +112,19 @@ async def _refuse(scope: Scope, receive: Receive, send: Send, status: int, why: 
         await send({"type": "websocket.close", "code": 1008, "reason": why[:100]})
         return
     await PlainTextResponse(why + "\n", status)(scope, receive, send)
+
+
+async def upload(request: Any) -> AsyncIterator[bytes]:
+    """The parts of a long body, which may take as long as there is one every ten seconds.
+
+    Raises
+    ------
+    ClientDisconnect
+        If the client has gone before the end.
+    """
+    request.scope[EXPECT_UPLOAD]()
+    async for part in request.stream():
+        yield part
 
 
 async def body(request: Any, bytes_max: int = BODY_BYTES_MAX) -> bytes | None:

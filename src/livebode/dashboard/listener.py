@@ -18,9 +18,10 @@ from starlette.types import Receive, Scope, Send
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from livebode.dashboard.access import network
+from livebode.dashboard.guard import EXPECT_UPLOAD
 
 REQUEST_S = 10.0
-"""Limit for a complete request, head and body, from the connection or its first byte."""
+"""Limit for a complete request, head and body, from the connection or its first byte; of an upload for each part."""
 IDLE_S = 30.0
 """Limit between two requests."""
 UNREAD_S = 20.0
@@ -53,15 +54,20 @@ class PatientProtocol(H11Protocol):
 
     _since_s = _unread_s = 0.0
     _idle = _upgraded = _working = False
+    _uploads = False
     heard = False
     """Whether anything that the client has sent was read."""
 
     async def _call(self, scope: Scope, receive: Receive, send: Send) -> None:
         self._working = True
+        scope[EXPECT_UPLOAD] = self._expect_upload
         try:
             await self.config.loaded_app(scope, receive, send)
         finally:
             self._working = False
+
+    def _expect_upload(self) -> None:
+        self._uploads, self._since_s = True, self.loop.time()
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         super().connection_made(transport)
@@ -69,12 +75,12 @@ class PatientProtocol(H11Protocol):
 
     def data_received(self, data: bytes) -> None:
         self.heard = True
-        if self._idle:
+        if self._idle or self._uploads:
             self._since_s, self._idle = self.loop.time(), False
         super().data_received(data)
 
     def on_response_complete(self) -> None:
-        self._since_s, self._idle = self.loop.time(), True
+        self._since_s, self._idle, self._uploads = self.loop.time(), True, False
         super().on_response_complete()
 
     def pause_writing(self) -> None:

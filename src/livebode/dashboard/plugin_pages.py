@@ -1,11 +1,11 @@
-"""What plug-ins show: pages instead of axes, and parts of the page of a run."""
+"""What plug-ins show: pages instead of axes, pages beside the list of runs, and parts of the page of a run."""
 
 from __future__ import annotations
 
 import warnings
 from collections.abc import Awaitable, Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol
 
 from livebode.plugins import PluginWarning, loaded, named, not_loaded
 
@@ -19,7 +19,12 @@ if TYPE_CHECKING:
     from livebode.dashboard.past import Past
     from livebode.dashboard.quantities import Quantities
 
-Order = Callable[["Request"], Awaitable["bytes | Response"]]
+
+class Order(Protocol):
+    """Reads the JSON of an operator."""
+
+    def __call__(self, request: Request, bytes_max: int = ...) -> Awaitable[bytes | Response]:
+        """The JSON, of at most so many bytes, or the answer to somebody else."""
 
 
 class PluginPages(Protocol):
@@ -44,6 +49,18 @@ class PluginPages(Protocol):
 
     async def run(self) -> None:
         """Update what the pages show until it is cancelled, in the thread of the server."""
+
+
+class WorkspacePages(PluginPages, Protocol):
+    """Pages that work in a directory of runs, beside their list; constructed with this directory, which may be missing.
+
+    Attributes
+    ----------
+    script
+        File in `static` that exports `workspace`, a `Workspace` of messages.d.ts, which the list of runs loads.
+    """
+
+    script: str
 
 
 class ShownRun(NamedTuple):
@@ -97,21 +114,39 @@ class PageAddition(Protocol):
 
 def page_additions() -> dict[str, type[PageAddition]]:
     """The additions of all plug-ins by name; one that cannot be loaded is left out with a PluginWarning."""
-    additions: dict[str, type[PageAddition]] = {}
-    for name, reference in named("pages").items():
+    return _classes("pages")
+
+
+def workspace_pages(directory: Path) -> dict[str, WorkspacePages]:
+    """The pages of all plug-ins that work in this directory, by name; left out as above."""
+    return {name: pages(directory) for name, pages in _classes("workspaces").items()}
+
+
+def _classes(group: Literal["pages", "workspaces"]) -> dict[str, Any]:
+    classes: dict[str, Any] = {}
+    for name, reference in named(group).items():
         try:
-            additions[name] = loaded(reference)
+            classes[name] = loaded(reference)
         except Exception as error:  # whatever the module of somebody else does: the page is needed without it, too
             why = f"{reference} {not_loaded(error)}; update its plug-in, or remove it"
-            warnings.warn(f"{name!r} is not on the page: {why}", PluginWarning, stacklevel=2)
-    return additions
+            warnings.warn(f"{name!r} is not on the page: {why}", PluginWarning, stacklevel=3)
+    return classes
 
 
-def files_of_additions() -> dict[str, bytes]:
-    """Static files of the additions, with the script that names them to the page, and their styles as one file."""
+def files_of_additions(workspaces: Mapping[str, WorkspacePages]) -> dict[str, bytes]:
+    """Static files of what plug-ins add, with the scripts that name it to the pages, and its styles as one file."""
     additions = page_additions()
-    files = {path.name: path.read_bytes() for page in additions.values() for path in sorted(page.static.iterdir())}
-    imports = [f'import {{ addition as {name} }} from "./{page.script}";' for name, page in additions.items()]
-    script = "\n".join([*imports, f"export const ADDITIONS = {{ {', '.join(additions)} }};", ""])
+    folders = [page.static for page in (*additions.values(), *workspaces.values())]
+    files = {path.name: path.read_bytes() for folder in folders for path in sorted(folder.iterdir())}
     styles = b"".join(content for name, content in files.items() if name.endswith(".css"))
-    return files | {"additions.js": script.encode(), "additions.css": styles}
+    return files | {
+        "additions.css": styles,
+        "additions.js": _script("addition", "ADDITIONS", additions),
+        "workspaces.js": _script("workspace", "WORKSPACES", workspaces),
+    }
+
+
+def _script(part: str, table: str, scripts: Mapping[str, Any]) -> bytes:
+    """A module that exports a table of what each script exports as `part`."""
+    imports = [f'import {{ {part} as {name} }} from "./{parts.script}";' for name, parts in scripts.items()]
+    return "\n".join([*imports, f"export const {table} = {{ {', '.join(scripts)} }};", ""]).encode()

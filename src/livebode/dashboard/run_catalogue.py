@@ -31,6 +31,8 @@ def runs_in(directory: Path) -> list[str]:
             names = [
                 item.name for item in entries if not item.name.startswith(".") and item.is_dir(follow_symlinks=False)
             ]
+    except FileNotFoundError:
+        return []
     except OSError as error:
         raise ServerError(
             "run-unknown",

@@ -14,14 +14,13 @@ from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
-from starlette.datastructures import Headers
-from starlette.requests import Request
+from starlette.requests import HTTPConnection, Request
 from starlette.responses import HTMLResponse, JSONResponse, RedirectResponse, Response
 from starlette.routing import BaseRoute, Mount, Route
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from livebode.core import LivebodeError, ServerError, UsageError, document_function
-from livebode.dashboard.access import Access, Role, error_answer
+from livebode.dashboard.access import Access, error_answer
 from livebode.dashboard.board import Board
 from livebode.dashboard.guard import body
 from livebode.dashboard.queries import json_object
@@ -237,28 +236,28 @@ class RunsPages:
 
     async def runs(self, request: Request) -> Response:
         """Rows that changed since the version that the page has."""
-        if (role := self._role(request)) is None:
+        if (role := self._board.access.role_of(request)) is None:
             return _unknown()
         rows = await self._board.elsewhere(self._catalogue.rows, version(request.query_params))
         return _json(rows | {"role": role, "directory": self._catalogue.directory.resolve().name})
 
     async def trends(self, request: Request) -> Response:
         """Points and alarms of runs that changed since the version that the page has."""
-        if self._role(request) is None:
+        if self._board.access.role_of(request) is None:
             return _unknown()
         trends = await self._board.elsewhere(self._catalogue.trends, version(request.query_params))
         return _json(trends)
 
     async def trend(self, request: Request) -> Response:
         """Many points of one run, for a zoomed chart."""
-        if self._role(request) is None:
+        if self._board.access.role_of(request) is None:
             return _unknown()
         path = await self._path(request.query_params.get("run"))
         return _json({"quantities": await self._board.elsewhere(details, path)})
 
     async def compare(self, request: Request) -> Response:
         """The report of `livebode compare` on two runs."""
-        if self._role(request) is None:
+        if self._board.access.role_of(request) is None:
             return RedirectResponse("/login", 303)
         query = request.query_params
         before, after = [await self._path(query.get(name)) for name in ("before", "after")]
@@ -297,9 +296,7 @@ class RunsPages:
             await send({"type": "websocket.close", "code": 1013})
 
     async def _run(self, scope: Scope, receive: Receive, send: Send) -> None:
-        headers, address = Headers(scope=scope), scope["client"][0] if scope.get("client") else ""
-        role = self._board.access.role(headers.get("cookie", ""), headers.get("authorization", ""), address)
-        if role is None:
+        if self._board.access.role_of(HTTPConnection(scope)) is None:
             await self._nobody(scope, receive, send)
             return
         path = await self._path(scope["path_params"]["name"])
@@ -318,15 +315,11 @@ class RunsPages:
         return await self._board.elsewhere(self._catalogue.path, run_name(name))
 
     def _html(self, request: Request, name: str) -> Response:
-        return RedirectResponse("/login", 303) if self._role(request) is None else self._file(name)
-
-    def _role(self, request: Request) -> Role | None:
-        headers, address = request.headers, request.client.host if request.client else ""
-        return self._board.access.role(headers.get("cookie", ""), headers.get("authorization", ""), address)
+        return RedirectResponse("/login", 303) if self._board.access.role_of(request) is None else self._file(name)
 
     def _not_operator(self, request: Request) -> Response | None:
         """The answer to a request that this person may not make."""
-        if (role := self._role(request)) is None:
+        if (role := self._board.access.role_of(request)) is None:
             return _unknown()
         if role != "operator":
             return JSONResponse(error_answer(Message("this session is read-only")), 403)

@@ -36,10 +36,15 @@ class Settled:
         lines = [f"# Written by `livebode inspect` from {recording}."]
         for section, table in self.tables.items():
             lines += ["", f"[{section}]"]
+            parts = {key: value for key, value in table.items() if isinstance(value, dict)}
             for key, value in table.items():
+                if key in parts:
+                    continue
                 line = tomli_w.dumps({key: value}).strip()
                 comment = self.comments.get((section, key), "")
-                lines.append(f"{line:<{_COLUMN}}# {comment}" if comment else line)
+                lines.append(f"{line:<{_COLUMN - 1}} # {comment}" if comment else line)
+            for key, part in parts.items():
+                lines += ["", tomli_w.dumps({section: {key: part}}).strip()]
         return "\n".join(lines) + "\n"
 
 
@@ -57,6 +62,32 @@ def suitable_estimator(log: Log, signals: Mapping[str, str]) -> tuple[str, str]:
     if "excitation" not in signals:
         return "direct", "without the excitation: for an open loop"
     return "joint", "for a machine in a control loop, whose excitation repeats"
+
+
+def tables_of(
+    source: Mapping[str, Any], signals: Mapping[str, str], *, estimator: str, average: bool, model: str
+) -> Tables:
+    """The tables of a configuration from its answers, for `settled`.
+
+    Parameters
+    ----------
+    source
+        Keys of [source]; those that are None are left out.
+    signals
+        The channel of each role.
+    estimator
+        Key of [tracking].
+    average
+        Whether to average over all periods, which the estimators of what does not repeat do anyway.
+    model
+        Of [fit]; "none" fits none.
+    """
+    averages = average and estimator not in ("lpm", "welch")
+    return {
+        "source": {key: value for key, value in source.items() if value is not None},
+        "signals": dict(signals),
+        "tracking": {"estimator": estimator} | ({"average": True} if averages else {}),
+    } | ({} if model == "none" else {"fit": {"model": model}})
 
 
 def settled(log: Log, tables: Tables, reasons: Mapping[str, str]) -> Settled:

@@ -13,6 +13,7 @@ from livebode.runtime.documents import Document as Document
 from livebode.runtime.documents import FitResults as FitResults
 from livebode.runtime.documents import RunEnded as RunEnded
 from livebode.runtime.documents import RunStarted as RunStarted
+from livebode.runtime.documents import RunStep as RunStep
 from livebode.runtime.documents import Subscriber as Subscriber
 from livebode.runtime.documents import TrackerResults as TrackerResults
 from livebode.runtime.estimate import SEEN_AGAIN_BYTES as SEEN_AGAIN_BYTES
@@ -36,6 +37,7 @@ from livebode.runtime.run_loop import RunLoop as RunLoop
 from livebode.runtime.session import Session as Session
 from livebode.runtime.single_response import SingleResponse as SingleResponse
 from livebode.runtime.status import Status as Status
+from livebode.runtime.successors import next_run as next_run
 from livebode.runtime.summary import counts_and_speed as counts_and_speed
 from livebode.runtime.summary import dated as dated
 from livebode.runtime.summary import of_log as of_log

@@ -145,8 +145,13 @@ class ServerError(LivebodeError):
     codes: ClassVar[Mapping[str, str]] = {
         "busy": "Too many requests wait already.",
         "cannot-listen": "The operating system does not let the dashboard listen at this address.",
+        "disk-full": "The disk has no room for an upload and the run of it.",
         "entry-only": "This is one entry of a matrix run, with which nothing can be saved.",
         "event-unknown": "An event with this key does not exist.",
+        "file-unknown": "A file of this name is not among those that the page offers.",
+        "job-not-started": "The operating system did not start the process of a job.",
+        "job-unknown": "A job of this name was not started since the server started.",
+        "name-invalid": "The text cannot be the name of a file.",
         "no-alarm": "The event is not an alarm, so it cannot be shelved.",
         "not-begun": "The run has no samples or responses yet.",
         "not-started": "The dashboard did not start in time.",
@@ -156,9 +161,12 @@ class ServerError(LivebodeError):
         "request-malformed": "A request or message of a browser is not what the dashboard takes.",
         "run-ended": "The run has ended, so its record cannot be changed.",
         "run-unknown": "A run of this name is not in the directory that is served.",
+        "task-unknown": "No installed wing has the command of this task.",
         "too-many-tries": "Wrong tokens came too often from this address.",
+        "upload-incomplete": "An upload ended before its announced length.",
+        "upload-too-long": "An upload is longer than the page receives.",
     }
-    temporary_codes: ClassVar[frozenset[str]] = frozenset({"busy", "not-started", "port-taken"})
+    temporary_codes: ClassVar[frozenset[str]] = frozenset({"busy", "job-not-started", "not-started", "port-taken"})
 
 
 class ArchiveError(LivebodeError):

@@ -104,6 +104,8 @@ export async function ask(path, query) {
 export const reason = (error) => (error instanceof Error ? error.message : String(error));
 
 /**
+ * The JSON of the answer.
+ *
  * @param {string} path
  * @param {object} body
  */
@@ -114,6 +116,7 @@ export async function post(path, body) {
     body: JSON.stringify(body),
   });
   if (!answer.ok) throw await refusal(answer);
+  return answer.json();
 }
 
 /**

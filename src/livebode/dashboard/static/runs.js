@@ -10,6 +10,7 @@ import { found, ORDERS, ordered, since, words } from "./runs_search.js";
 import { head, row } from "./runs_table.js";
 import { state, verdict } from "./runs_words.js";
 import { applyTheme, nextTheme } from "./theme.js";
+import { WORKSPACES } from "./workspaces.js";
 
 const SHOWN = 100;
 applyTheme();
@@ -37,6 +38,7 @@ const actions = {
     if (on) chosen.add(name);
     else chosen.delete(name);
     comparison();
+    update();
   },
   search: (word) => {
     if (!words(search.value).includes(words(word)[0])) search.value = `${search.value} ${word}`.trim();
@@ -45,6 +47,8 @@ const actions = {
   edit: editNotes,
   remove: (run) => askDeletion(run, feed.directory),
 };
+
+const draws = Object.values(WORKSPACES).map((workspace) => workspace($("workspaces")));
 
 function draw() {
   actions.may = feed.role === "operator";
@@ -69,6 +73,11 @@ function draw() {
   $("more").hidden = matching.length <= shown.length;
   $("more").textContent = tr("Show all {count}", { count: matching.length });
   comparison();
+  update();
+}
+
+function update() {
+  for (const drawn of draws) drawn({ directory: feed.directory, role: feed.role, runs: feed.runs, chosen });
 }
 
 /** @param {string} by */

@@ -285,12 +285,14 @@ class FleetPages:
 
     async def _known(self, answer: Callable[[Request], Awaitable[Response]], request: Request) -> Response:
         """The answer to somebody who has logged in."""
-        if self._role(request) is None:
+        if self._board.access.role_of(request) is None:
             return JSONResponse(error_answer(Message("log in first")), 401)
         return await answer(request)
 
     async def page(self, request: Request) -> Response:
-        return RedirectResponse("/login", 303) if self._role(request) is None else self._file("fleet.html")
+        return (
+            RedirectResponse("/login", 303) if self._board.access.role_of(request) is None else self._file("fleet.html")
+        )
 
     async def axes(self, _: Request) -> Response:
         """Path of each axis in a line, in order; the layout is in a header."""
@@ -326,7 +328,3 @@ class FleetPages:
             raise ServerError("not-begun", "no axis is known yet", "wait for the first status")
         await self._view.act(act, alarm_request(data, axes, act))
         return JSONResponse({}, 202)
-
-    def _role(self, request: Request) -> Role | None:
-        headers, address = request.headers, request.client.host if request.client else ""
-        return self._board.access.role(headers.get("cookie", ""), headers.get("authorization", ""), address)

@@ -1,0 +1,1 @@
+"""From nothing to a Bode plot in the browser: the start page of a directory of runs."""

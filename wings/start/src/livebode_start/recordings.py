@@ -1,0 +1,234 @@
+"""A recording as the page shows it: channels, roles, signals, and the configuration from a person's choices."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from livebode.core import ServerError, UsageError
+from livebode.language import Message, for_page
+from livebode.plugins import named
+from livebode.preparation import Guess, Proposals, Settled, chosen_part, settled, suitable_estimator, tables_of
+from livebode.sources import Log, open_log
+from livebode_start.preview import Overview
+
+OPEN_MAX = 4
+"""Recordings in memory."""
+_CHANNELS_MAX = 500
+_NAME_MAX = 500
+_ESTIMATORS = "joint", "direct", "lpm", "welch"
+Role = Literal["excitation", "input", "output", "schedule"]
+
+
+class LineChoice(BaseModel):
+    """Lines and window as [lines] has them."""
+
+    model_config = ConfigDict(extra="forbid")
+    frequencies: str = Field(max_length=50_000)
+    window: int
+
+
+class Choices(BaseModel):
+    """What a person chose on the page; what is None is found.
+
+    Attributes
+    ----------
+    recording
+        Name of the file.
+    rate_hz
+        Samples per second, of a recording without a rate.
+    signals
+        The channel of each role.
+    begin_s, end_s
+        The span that is used, in the time of the recording.
+    lines
+        Lines and window.
+    estimator, average, model
+        Keys of the configuration.
+    """
+
+    model_config = ConfigDict(extra="forbid")
+    recording: str = Field(max_length=_NAME_MAX)
+    rate_hz: float | None = None
+    signals: dict[Role, str] = {}
+    begin_s: float | None = None
+    end_s: float | None = None
+    lines: LineChoice | None = None
+    estimator: str | None = Field(None, max_length=20)
+    average: bool | None = None
+    model: str | None = Field(None, max_length=60)
+
+    @classmethod
+    def read(cls, data: bytes) -> Choices:
+        """The choices of a request; ServerError if it is malformed."""
+        try:
+            return cls.model_validate_json(data)
+        except ValidationError as error:
+            first = error.errors()[0]
+            place = ".".join(map(str, first["loc"]))
+            raise ServerError(
+                "request-malformed", f"the choices are malformed ({place}: {first['msg']})", Message("reload the page")
+            ) from None
+
+
+@dataclass
+class OpenedRecording:
+    """A recording of the workspace in memory.
+
+    Attributes
+    ----------
+    name
+        Of its file.
+    rate_hz
+        As given, for one without a rate; else None.
+    log
+        What reads it.
+    """
+
+    name: str
+    rate_hz: float | None
+    log: Log
+
+    @cached_property
+    def proposals(self) -> Proposals:
+        """Roles of its channels."""
+        return Proposals(self.log)
+
+    @cached_property
+    def stop(self) -> int:
+        """Number of the sample after its last one."""
+        if self.log.stop is not None:
+            return self.log.stop
+        return max((block.stop for block in self.log.blocks([self.proposals.channels[0].name])), default=0)
+
+    @cached_property
+    def overview(self) -> Overview:
+        """Extremes of all channels."""
+        return Overview.read(self.log, [channel.name for channel in self.proposals.channels], self.stop)
+
+    def plain(self) -> dict[str, Any]:
+        """Facts, channels and proposed roles, for JSON."""
+        log, channels = self.log, self.proposals.channels[:_CHANNELS_MAX]
+        timing = log.timing
+        return {
+            "recording": self.name,
+            "format": log.format,
+            "rate_hz": log.rate_hz,
+            "rate_given": self.rate_hz is not None,
+            "begin_s": log.origin_s,
+            "end_s": log.origin_s + self.stop / log.rate_hz,
+            "gaps": 0 if timing is None else timing.gaps,
+            "channels": [
+                {
+                    "name": channel.name,
+                    "unit": channel.unit,
+                    "kind": channel.kind,
+                    "constant": not channel.minimum < channel.maximum,
+                    "not_finite": channel.not_finite,
+                }
+                for channel in channels
+            ],
+            "estimators": list(_ESTIMATORS),
+            "models": ["none", "auto", *named("models")],
+            "skipped": [[skipped.name, skipped.reason] for skipped in log.skipped[:_CHANNELS_MAX]],
+            "roles": {
+                role: {"channel": guess.channel, "reason": for_page(guess.reason), "others": list(guess.others)}
+                for role, guess in self.guesses.items()
+            },
+        }
+
+    @cached_property
+    def guesses(self) -> dict[str, Guess]:
+        """The proposed channel of each role, or None, with the reason."""
+        return self.proposals.roles()
+
+
+@dataclass(frozen=True)
+class ProposedConfiguration:
+    """A checked configuration, and what was found for it."""
+
+    settled: Settled
+    estimator: str
+    estimator_reason: str
+    average: bool
+    model: str
+
+    def plain(self, recording: str) -> dict[str, Any]:
+        """Text and values, for JSON."""
+        lines = self.settled.tables.get("lines", {})
+        comments = self.settled.comments
+        return {
+            "text": self.settled.text(recording),
+            "lines": lines or None,
+            "lines_found": comments.get(("lines", "frequencies"), ""),
+            "window_found": comments.get(("lines", "window"), ""),
+            "estimator": self.estimator,
+            "estimator_reason": self.estimator_reason,
+            "average": self.average,
+            "model": self.model,
+            "doubts": [for_page(doubt) for doubt in self.settled.doubts],
+        }
+
+
+class OpenedRecordings:
+    """The recordings in memory; for one thread at a time."""
+
+    def __init__(self) -> None:
+        self._opened: OrderedDict[Any, OpenedRecording] = OrderedDict()
+
+    def open(self, path: Path, rate_hz: float | None) -> OpenedRecording:
+        """The recording of a file, read again if the file has changed; LivebodeError if it cannot be read."""
+        status = path.stat()
+        key = path.name, status.st_mtime_ns, status.st_size, rate_hz
+        if key not in self._opened:
+            self._opened[key] = OpenedRecording(path.name, rate_hz, open_log(path, rate_hz=rate_hz))
+            while len(self._opened) > OPEN_MAX:
+                self._opened.popitem(last=False)
+        self._opened.move_to_end(key)
+        return self._opened[key]
+
+
+def proposed(opened: OpenedRecording, choices: Choices) -> ProposedConfiguration:
+    """The configuration of these choices, found and checked as `livebode inspect --out` does it.
+
+    Raises
+    ------
+    LivebodeError
+        If the recording contradicts them, or they do not suffice.
+    """
+    signals = {role: name for role, name in choices.signals.items() if name}
+    _check_signals(signals)
+    log = chosen_part(opened.log, choices.begin_s, choices.end_s, 0, _no_periods)
+    estimator, reason = suitable_estimator(log, signals)
+    estimator = choices.estimator or estimator
+    average = "schedule" not in signals if choices.average is None else choices.average
+    model = choices.model or "none"
+    source = {
+        "log": opened.name, "rate_hz": choices.rate_hz, "from": choices.begin_s, "to": choices.end_s
+    }  # fmt: skip
+    tables = tables_of(source, signals, estimator=estimator, average=average, model=model)
+    if choices.lines is not None:
+        tables["lines"] = choices.lines.model_dump()
+    reasons = {role: _reason(opened, role, name) for role, name in signals.items()}
+    return ProposedConfiguration(settled(log, tables, reasons), estimator, reason, average, model)
+
+
+def _reason(opened: OpenedRecording, role: str, name: str) -> str:
+    guess = opened.guesses[role]
+    return str(guess.reason) if guess.channel == name else "as specified"
+
+
+def _check_signals(signals: dict[Role, str]) -> None:
+    if "output" not in signals:
+        raise UsageError("missing", Message("the output has no channel"), Message("choose one"), argument="output")
+    if "input" not in signals:
+        raise UsageError("missing", Message("the input has no channel"), Message("choose one"), argument="input")
+
+
+def _no_periods(_: Log) -> tuple[int, int]:
+    raise AssertionError  # limits of the page are in seconds

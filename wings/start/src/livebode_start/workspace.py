@@ -1,0 +1,127 @@
+"""The files of a directory of runs, and harmless names for those that come from a browser."""
+
+from __future__ import annotations
+
+import os
+import re
+import unicodedata
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
+from itertools import count
+from pathlib import Path, PurePosixPath, PureWindowsPath
+from typing import Any
+
+from livebode.core import LivebodeError, ServerError
+from livebode.language import Message
+from livebode.plugins import tables
+
+NAME_BYTES_MAX = 100
+"""Of a name without its ending: run directory, configuration and outbox are named after it."""
+_ENDING_LETTERS_MAX = 12
+_FILES_MAX = 1000
+_FORBIDDEN = re.compile(r'[<>:"/\\|?*]')
+_DEVICE = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)
+_OWN = (".toml", ".json", ".jsonl", ".sqlite")  # a run.json would make the directory a run
+
+
+def harmless_name(text: str) -> str:
+    """A name of a file that is valid on every system and in no other directory, from one that somebody else chose.
+
+    >>> harmless_name("../../etc/passwd"), harmless_name("C:\\\\logs\\\\axis 3.csv"), harmless_name("con.csv")
+    ('passwd', 'axis 3.csv', '_con.csv')
+    >>> harmless_name("run.json"), harmless_name("..")
+    ('run.json.txt', 'recording')
+    """
+    text = PureWindowsPath(PurePosixPath(text.replace("\0", "")).name).name
+    text = unicodedata.normalize("NFC", text.encode(errors="ignore").decode())
+    text = "".join(letter for letter in text if unicodedata.category(letter)[0] != "C")
+    text = _FORBIDDEN.sub("_", text).strip(". ")
+    if _DEVICE.fullmatch(text):
+        text = f"_{text}"
+    stem, dot, ending = text.rpartition(".")
+    if not dot or len(ending) > _ENDING_LETTERS_MAX:
+        stem, ending = text, ""
+    stem = stem.encode()[:NAME_BYTES_MAX].decode(errors="ignore").strip(". ") or "recording"
+    name = f"{stem}.{ending}" if ending else stem
+    return f"{name}.txt" if name.lower().endswith(_OWN) else name
+
+
+class Workspace:
+    """A directory with recordings, their configurations and runs.
+
+    A name from outside is looked for among the names in it, and never becomes a path by itself.
+
+    Parameters
+    ----------
+    directory
+        It may be missing.
+    """
+
+    def __init__(self, directory: Path) -> None:
+        self.directory = directory.absolute()
+
+    def files(self) -> dict[str, os.stat_result]:
+        """The plain files by name, without links and hidden ones."""
+        try:
+            with os.scandir(self.directory) as entries:
+                plain = [e for e in entries if not e.name.startswith(".") and e.is_file(follow_symlinks=False)]
+                return {entry.name: entry.stat(follow_symlinks=False) for entry in plain}
+        except OSError:  # it is missing, or may not be read: there is nothing to choose from
+            return {}
+
+    def recordings(self) -> list[dict[str, Any]]:
+        """Name, bytes and seconds since 1970 of each file with the ending of a recording, the newest first."""
+        endings = tuple({ending for table in tables("readers") for format_ in table for ending in format_.suffixes})
+        rows = [
+            {"name": name, "size_bytes": status.st_size, "written": status.st_mtime}
+            for name, status in self.files().items()
+            if name.lower().endswith(endings)
+        ]
+        return sorted(rows, key=lambda row: row["written"], reverse=True)[:_FILES_MAX]
+
+    def path(self, name: object) -> Path:
+        """The file of this name; ServerError if there is none."""
+        if not isinstance(name, str) or name not in self.files():
+            shown = name[:NAME_BYTES_MAX] if isinstance(name, str) else ""
+            raise ServerError(
+                "file-unknown", f"there is no recording {shown!r}", Message("reload the page"), name=shown
+            )
+        return self.directory / name
+
+    def free_name(self, name: str, taken: Collection[str] = ()) -> str:
+        """This name, or one with a number, that neither a file nor `taken` has."""
+        stem, dot, ending = name.rpartition(".")
+        stem, ending = (stem, dot + ending) if dot else (name, "")
+        return next(other for other in _numbered(stem, ending) if other not in taken and not self._has(other))
+
+    def free_stem(self, stem: str) -> str:
+        """This name, or one with a number, that neither a run nor a configuration has."""
+        return next(other for other in _numbered(stem) if not self._has(other) and not self._has(f"{other}.toml"))
+
+    def check_free(self, name: str) -> None:
+        """ServerError if another program has put a file of this name here meanwhile."""
+        if self._has(name):
+            raise ServerError(
+                "busy", Message("another {name} was put here meanwhile", name=name), Message("send it again")
+            )
+
+    def _has(self, name: str) -> bool:
+        return os.path.lexists(self.directory / name)
+
+    @contextmanager
+    def short_names(self, directory: Path | None = None) -> Iterator[None]:
+        """Errors inside it name files by their names in this directory; default: the workspace."""
+        prefix = f"{directory or self.directory}{os.sep}"
+        try:
+            yield
+        except LivebodeError as error:
+            for part in ("message", "remedy", "place"):
+                if prefix in (text := getattr(error, part)):
+                    setattr(error, part, text.replace(prefix, ""))
+            raise
+
+
+def _numbered(stem: str, ending: str = "") -> Iterator[str]:
+    yield stem + ending
+    for number in count(2):
+        yield f"{stem}-{number}{ending}"
