@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 
 from livebode.sources.live import encode_line
-from tests.runtime.test_live_run_truth import axis, sent
 from tests.support.command import livebode, signals, write_parquet
 from tests.support.forked import Command
+from tests.support.live_runs import axis, sent
 from tests.support.peers.peer import PATIENCE_S
 from tests.support.small_axis import SMALL_AXIS
 
