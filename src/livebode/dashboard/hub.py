@@ -47,11 +47,10 @@ class Hub:
         self.name = name
         self.directory: Path | None = None
         self.begun: Mapping[str, Any] | None = None
-        self.complete = False
-        """Whether no more samples follow: the run draws its pictures, and ends."""
         self.ended: Mapping[str, Any] | None = None
         self.overview: Overview | None = None
         self.samples = self.gaps = self.given_up = 0
+        self._complete = False
         self.intervals_s: deque[float] = deque(maxlen=_INTERVALS)
         self.followed_s = 0.0
         """`time.monotonic()` of the newest samples, or of the start of the run."""
@@ -88,9 +87,14 @@ class Hub:
             case ClockSet(pieces):
                 self.clock = pieces
             case RunStep("ending"):
-                self.complete = True
+                self._complete = True
             case RunEnded(summary):
                 self.ended = summary
+
+    @property
+    def ending(self) -> bool:
+        """Whether no more samples follow: the source is at its end, or a person ended the run; pictures are drawn."""
+        return self._complete or (self.control is not None and self.control.ended)
 
     def record(self, event: Event) -> bool:
         """Record an event of a person; False if the run has ended or too many are waiting."""
@@ -100,7 +104,8 @@ class Hub:
         with self._lock:  # buffered data belong to a previous run, whose lines may differ
             self._rows, self._values = deque(), 0
         self.directory, self.control, self.overview = started.directory, started.control, started.overview
-        self.ended, self.complete = None, False
+        self.ended = None
+        self._complete = False
         self.followed_s, self.clock = time.monotonic(), ()
         self.intervals_s.clear()
         self.begun = started.summary
