@@ -49,7 +49,7 @@ def test_an_edited_configuration_of_a_recording_is_a_new_run(tmp_path: Path) -> 
 def test_a_machine_continues_its_run_and_begins_another_with_another_configuration(tmp_path: Path) -> None:
     """Also when that is given again, the run of the newest configuration continues."""
 
-    def tracked(text: str, *, end: bool) -> int:
+    def tracked(text: str, *, end: bool) -> int | None:
         path = axis(tmp_path, 'url = "stdin:"', text)
         with Command("run", path, "--json") as process:
             assert process.stdin is not None

@@ -90,7 +90,7 @@ def recorded_hop(axis: Axis, log: Log, lines: Lines) -> int | None:
     changes are timed, has the usual hop.
     """
     timed = axis.signals.schedule or axis.motion or axis.monitoring.baseline or axis.signals.ready
-    if axis.tracking.hop or timed or len(axis.source.logs) > 1:
+    if axis.tracking.hop or timed or log.samples is None:
         return None
     least = log.samples * len(lines) / RECORDED_VALUES_MAX
     if least <= default_hop(lines.window):
