@@ -104,8 +104,8 @@ def hop_event(axis: Axis, log: Log, settings: Settings) -> list[Event]:
     if settings.step != recorded_hop(axis, log, settings.lines):
         return []
     message = Message(
-        "the recording is long: a response every {hop} samples, not every {usual}, so that the run is small; --hop "
-        "{usual} gives all of them",
+        "the recording is long: it has a response every {hop} samples, so that the run is small; --hop {usual} gives "
+        "the usual number",
         hop=settings.step,
         usual=usual,
     )
