@@ -343,9 +343,9 @@ def _with_progress(job: Callable[[tuple[Subscriber, ...]], Outcome], quiet: bool
         countdown = Countdown()
         task = bar.add_task(_STEPS["opening"][0], total=1.0, countdown=countdown)
 
-        def show(done: float, **changes: str) -> None:
+        def show(done: float, description: str | None = None) -> None:
             countdown.reach(done)
-            bar.update(task, completed=done, **changes)
+            bar.update(task, completed=done, description=description)
 
         def show_progress(document: Document) -> None:
             if isinstance(document, RunStep):

@@ -90,7 +90,7 @@ def recorded_hop(axis: Axis, log: Log, lines: Lines) -> int | None:
     changes are timed, has the usual hop.
     """
     timed = axis.signals.schedule or axis.motion or axis.monitoring.baseline or axis.signals.ready
-    if axis.tracking.hop or timed or len(axis.source.logs) > 1:
+    if axis.tracking.hop or timed or log.samples is None:
         return None
     least = log.samples * len(lines) / RECORDED_VALUES_MAX
     if least <= default_hop(lines.window):
@@ -104,8 +104,8 @@ def hop_event(axis: Axis, log: Log, settings: Settings) -> list[Event]:
     if settings.step != recorded_hop(axis, log, settings.lines):
         return []
     message = Message(
-        "the recording is long: a response every {hop} samples, not every {usual}, so that the run is small; --hop "
-        "{usual} gives all of them",
+        "the recording is long: it has a response every {hop} samples, so that the run is small; --hop {usual} gives "
+        "the usual number",
         hop=settings.step,
         usual=usual,
     )
