@@ -19,9 +19,9 @@ from livebode_start.jobs import RUNNING_MAX, Job, JobOrder, Jobs, file_name
 from tests.support.browser import until
 from tests.support.command import livebode, signals, write_csv
 
-DEMO = JobOrder("run", ("demo", "--seconds=600", "--out=demo"), ("demo",))
+DEMO = JobOrder("run", ("demo", "--seconds=600", "--out=demo"))
 """Ten minutes of a simulated axis, in real time."""
-LIVE = JobOrder("run", ("run", "axis.toml", "--out=live"), ("live",))
+LIVE = JobOrder("run", ("run", "axis.toml", "--out=live"))
 """A file that is followed: samples at once, and then none."""
 AXIS = """
 source = {log = "log.csv", follow = true, rate_hz = 1000}

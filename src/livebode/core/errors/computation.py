@@ -113,6 +113,7 @@ class DesignError(LivebodeError):
         "amplitude-undetermined": "No amplitude can be chosen, as neither noise nor limits are known.",
         "crest-factor-not-reached": "No excitation with such a low crest factor was found.",
         "feedback-unknown": "The feedback of the loop is needed and not described.",
+        "format-impossible": "The excitation cannot be written in this format.",
         "limit-exceeded": "The excitation would exceed a limit of the machine.",
         "line-without-power": "The excitation has no power at one of its lines.",
         "motion-unknown": "A quantity has a limit, but its range in the motion alone is not given.",

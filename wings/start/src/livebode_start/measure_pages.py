@@ -139,7 +139,7 @@ class MeasurePages:
                     write_whole(path, answer["text"].encode())
 
             arguments = ("run", path.name, f"--out={stem}")
-            return {"job": self._jobs.start(JobOrder("measure", arguments, (stem,), prepare)).id, "run": stem}
+            return {"job": self._jobs.start(JobOrder("measure", arguments, prepare)).id, "run": stem}
 
         return _json(await self._read(job))
 

@@ -224,9 +224,10 @@ def _reason(opened: OpenedRecording, role: str, name: str) -> str:
 
 
 def _check_signals(signals: dict[Role, str]) -> None:
-    for role in ("output", "input"):
-        if role not in signals:
-            raise UsageError("missing", Message("the {role} has no channel", role=Message(role)), argument=role)
+    if "output" not in signals:
+        raise UsageError("missing", Message("the output has no channel"), Message("choose one"), argument="output")
+    if "input" not in signals:
+        raise UsageError("missing", Message("the input has no channel"), Message("choose one"), argument="input")
 
 
 def _no_periods(_: Log) -> tuple[int, int]:
