@@ -48,8 +48,9 @@ class Servo:
         """Numerator and denominator from torque to speed, with the hold."""
         spring = 2 * self.damping * 2 * np.pi * self.resonance_hz / (1 / self.motor + 1 / self.load)
         whole = self.motor + self.load
-        denominator = [self.motor * self.load, whole * spring, whole * self.stiffness, 0.0]
-        (b,), a, _ = cont2discrete(([self.load, spring, self.stiffness], denominator), 1 / rate_hz)
+        numerator = np.array([self.load, spring, self.stiffness])
+        denominator = np.array([self.motor * self.load, whole * spring, whole * self.stiffness, 0.0])
+        (b,), a, _ = cont2discrete((numerator, denominator), 1 / rate_hz)
         return b, a
 
     def response(self, frequency_hz: Floats, rate_hz: float = 2000.0) -> Complex:
