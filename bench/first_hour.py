@@ -18,7 +18,7 @@ from pathlib import Path
 from bench.browser import chromium
 from livebode.dashboard import Dashboard, ServerSettings
 from livebode.records import RunRecord
-from tests.support.start_pages import write_servo
+from tools.two_mass_servo import write_servo
 
 WORDS_PER_MINUTE = 238.0
 CLICK_S = 1.5
