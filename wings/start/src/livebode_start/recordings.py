@@ -201,7 +201,7 @@ def proposed(opened: OpenedRecording, choices: Choices) -> ProposedConfiguration
     LivebodeError
         If the recording contradicts them, or they do not suffice.
     """
-    signals = {role: name for role, name in choices.signals.items() if name}
+    signals: dict[str, str] = {role: name for role, name in choices.signals.items() if name}
     _check_signals(signals)
     log = chosen_part(opened.log, choices.begin_s, choices.end_s, 0, _no_periods)
     estimator, reason = suitable_estimator(log, signals)
@@ -223,7 +223,7 @@ def _reason(opened: OpenedRecording, role: str, name: str) -> str:
     return str(guess.reason) if guess.channel == name else "as specified"
 
 
-def _check_signals(signals: dict[Role, str]) -> None:
+def _check_signals(signals: dict[str, str]) -> None:
     if "output" not in signals:
         raise UsageError("missing", Message("the output has no channel"), Message("choose one"), argument="output")
     if "input" not in signals:
