@@ -28,6 +28,7 @@ from livebode.estimation.verdicts import KINDS as DOUBTS
 from livebode.fitting import model_named
 from livebode.fitting.competitors import LAG, MODE, RESIDUAL, ExtendedModel
 from livebode.fitting.models import MODELS
+from livebode.language import QUANTITY_NAMES
 from livebode.monitoring import ALARMS, RETURNS, UNMONITORED
 from livebode.monitoring.sensitivity import DIRECTIONS
 from livebode.runtime.run_counts import CAUSES
@@ -77,7 +78,8 @@ def extracted() -> dict[Key, set[str]]:
 
 def _names() -> set[str]:
     """What is data: names of quantities, parameters, margins and alarms; the help of what the tasks ask for."""
-    found = {*QUANTITIES, *DIRECTIONS, *ALARMS, *RETURNS, *UNMONITORED, *CAUSES, *DOUBTS, *VALUES, *texts_of_tasks()}
+    found = {*QUANTITIES, *QUANTITY_NAMES, *DIRECTIONS, *ALARMS, *RETURNS, *UNMONITORED, *CAUSES, *DOUBTS, *VALUES}
+    found |= texts_of_tasks()
     for model in map(model_named, MODELS):
         extended = ExtendedModel(model, (LAG, RESIDUAL, MODE), 100.0)
         found |= {name.replace("_", " ") for name in (*extended.names, *model.derived_names)}

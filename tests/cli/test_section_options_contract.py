@@ -44,7 +44,8 @@ def test_the_keys_of_a_section_have_the_defaults_types_and_limits_of_its_model(s
 
 def test_the_help_is_the_description_with_default_and_limits() -> None:
     assert key_help("tracking.forgetting") == (
-        "Weight of a period relative to the next one; 1 forgets nothing. \\[default: 0.8; x>0; x<=1]"
+        "Weight of a period relative to the next one; 1 forgets nothing. "
+        "\\[default: 0.8; 1 for the average of a recording; x>0; x<=1]"
     )
     assert key_help("source.dbc") == "DBC file that defines the signals of CAN frames, live or in a recording."
     assert key_help("tracking.spikes").endswith("windows with a spike are excluded; repeat for several.")

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
+import os
 import signal
 import socket
 import subprocess
@@ -14,6 +16,8 @@ import numpy as np
 import pytest
 
 from livebode.core import Channel, Event
+from livebode.dashboard.run_entry import entry
+from livebode.records import RunRecord
 from livebode.runtime import Document, RunStarted
 from livebode.sources.live import Batch, encode_layout, encode_line, encode_samples
 from tests.support.command import RATE_HZ, livebode, signals, write_parquet
@@ -80,6 +84,44 @@ def test_ctrl_c_leaves_a_whole_run_with_its_gaps(tmp_path):
     events = [json.loads(line) for line in (tmp_path / "live" / "events.jsonl").read_text().splitlines()]
     assert [event["kind"] for event in events] == ["connected", "loss", "gap"]
     assert (tmp_path / "live" / "bode.png").is_file()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+def test_a_run_that_a_person_ends_is_complete_and_a_killed_one_is_not(tmp_path: Path, number: signal.Signals) -> None:
+    """In run.json, in the list of runs and in the report; the same command continues both."""
+    port, run = free_port(socket.SOCK_DGRAM), tmp_path / "live"
+    path = axis(tmp_path, f'url = "udp://127.0.0.1:{port}"')
+    batches = iter(sent(20_000))
+
+    def send(sender: socket.socket) -> bool:
+        with contextlib.suppress(ConnectionError):
+            sender.send(encode_samples(next(batches), double=True))
+        return (run / "run.json").exists() and len(RunRecord.open(run).responses()) > 20
+
+    with started(path, run) as process, socket.socket(type=socket.SOCK_DGRAM) as sender:
+        sender.connect(("127.0.0.1", port))
+        layout = encode_layout(CHANNELS, float(RATE_HZ), epoch=9)
+        until(lambda: listens(sender, layout), "the port to be open")
+        until(lambda: send(sender), "responses to be recorded")
+        process.send_signal(number)
+        process.communicate(timeout=PATIENCE_S)
+    complete = number != signal.SIGKILL
+    assert process.returncode == (0 if complete else -number)
+    assert RunRecord.open(run).ended == complete
+    aged(run)
+    assert entry(run).state == ("finished" if complete else "stopped")
+    assert livebode("report", run, "--out", tmp_path / "report.html").code == 0
+    assert ("The run is not finished" in (tmp_path / "report.html").read_text()) != complete
+    with started(path, run), socket.socket(type=socket.SOCK_DGRAM) as sender:
+        sender.connect(("127.0.0.1", port))
+        until(lambda: listens(sender, layout), "the port to be open again")
+        until(lambda: send(sender) and not RunRecord.open(run).ended, "it to continue")
+
+
+def aged(run: Path) -> None:
+    """Files that did not change for a minute are not being recorded."""
+    for file in (run, *run.rglob("*")):
+        os.utime(file, (time.time() - 60, time.time() - 60))
 
 
 def test_a_run_whose_wait_times_out_is_ended(tmp_path):

@@ -430,6 +430,6 @@ def test_a_password_in_the_url_is_refused_and_not_repeated():
 
 def test_a_key_of_another_kind_of_source_is_refused():
     settings = SourceSettings(url="udp://h:1", nodes={"w": "ns=2;s=w"})
-    allowed = ["rate_hz", "reorder_batches", "sender", "url"]
+    allowed = ["fields", "rate_hz", "reorder_batches", "sample_field", "sender", "url"]
     with refused(ConfigError, "key-unused", key="source.nodes", source="udp", allowed=allowed):
         check_keys(settings, "udp")

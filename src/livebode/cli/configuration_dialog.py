@@ -6,18 +6,20 @@ import os
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from livebode.cli import terminal
+from livebode.cli.live_survey import is_live
 from livebode.cli.shell import command_line
-from livebode.core import LivebodeError, OutputError, RecordingError, UsageError, write_whole, writing
+from livebode.core import LivebodeError, OutputError, RecordingError, SourceError, UsageError, write_whole, writing
 from livebode.locations import Location, Url, local_copy, location
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from livebode.preparation import Guess, Proposals, Settled
+    from livebode.preparation import Guess, Proposals, Recorded, Settled
     from livebode.sources import Log
 
 _NONE = "-"
@@ -54,19 +56,29 @@ def write_configuration(
     from livebode.preparation import Proposals
     from livebode.records import to_json
 
+    recording: Recorded
+    source: dict[str, Any]
+
     asks = not (yes or as_json)
     _check_replaceable(out, force)
-    place = location(log)
-    if asks:
-        _check_recording(place)
-        _check_terminal()
     console = terminal.console(markup=False) if asks else None
-    recording, rate = _opened(place, rate, time, dbc, console)
+    if is_live(log):
+        if asks:
+            _check_terminal()
+        recording, source = _heard(log, rate)
+        title = log
+    else:
+        place = location(log)
+        if asks:
+            _check_recording(place)
+            _check_terminal()
+        recording, rate = _opened(place, rate, time, dbc, console)
+        title = place.name
+        source = {"log": _relative(place, out), "rate_hz": rate, "time": time, "dbc": dbc and _relative(dbc, out)}
     recording.naming([name for name in given.values() if name and name != _NONE])
     proposals = Proposals(recording)
     if console is not None:
         _list(proposals, console)
-    source = {"log": _relative(place, out), "rate_hz": rate, "time": time, "dbc": dbc and _relative(dbc, out)}
     known = given | {"estimator": estimator, "average": average, "fit": fit}
     dialog = Dialog(proposals, {key: value for key, value in known.items() if value is not None}, console)
     result = dialog.settled(source)
@@ -74,7 +86,7 @@ def write_configuration(
         print(f"livebode: {doubt}", file=sys.stderr)
     with writing(out):
         out.parent.mkdir(parents=True, exist_ok=True)
-        write_whole(out, result.text(place.name).encode())
+        write_whole(out, result.text(title).encode())
     if as_json:
         print(to_json({"file": str(out), "configuration": result.tables}))
         return
@@ -82,6 +94,22 @@ def write_configuration(
         reasons = ((role, name, result.comments["signals", role]) for role, name in result.tables["signals"].items())
         print("".join(f"{role}: {name} ({reason})\n" for role, name, reason in reasons), end="")
     print(f"{out}\nTrack it: {command_line('livebode', 'run', str(out))}")
+
+
+def _heard(url: str, rate: float | None) -> tuple[Recorded, dict[str, Any]]:
+    """What came from a live source, and its section [source]."""
+    from livebode.sources.live import HeardSamples, survey
+
+    heard = survey(url)
+    if heard.block is None:
+        raise SourceError(
+            "no-samples",
+            heard.trouble or "the channels have no samples in common",
+            f"see what arrives: {command_line('livebode', 'inspect', url)}",
+            address=url,
+        ).at(url)
+    block = heard.block if rate is None else replace(heard.block, rate_hz=rate)
+    return HeardSamples(block, url), {**heard.source, "rate_hz": block.rate_hz}
 
 
 def _check_recording(place: Location) -> None:

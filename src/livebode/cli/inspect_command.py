@@ -9,6 +9,7 @@ import typer
 
 from livebode.cli import terminal
 from livebode.cli.configuration_dialog import write_configuration
+from livebode.cli.live_survey import is_live, show_survey
 from livebode.cli.options import Excitation, Json, Output, check_use
 from livebode.cli.recording_options import Dbc, From, Rate, SkipPeriods, Time, To
 from livebode.core import UsageError, counted
@@ -32,7 +33,9 @@ _WIDTH_MAX = 4096
 
 def inspect_command(
     context: typer.Context,
-    log: Annotated[str, typer.Argument(metavar="LOG", help="A recording.")],
+    log: Annotated[
+        str, typer.Argument(metavar="LOG|URL", help="A recording, or the address of a live source: udp://0.0.0.0:5000.")
+    ],
     out: Annotated[
         Path | None,
         typer.Option(
@@ -81,7 +84,8 @@ def inspect_command(
     With --excitation, also print period, lines and SNR. With --lines, search for mains hum in a recording without
     excitation, or in its longest pause. With --out, propose the role of each channel by its unit, its name and its
     values, ask, find lines and window, and write the configuration. What an option gives is not asked for; "-" means no
-    channel.
+    channel. A live source is listened to for 3 s, and its channels, or the fields of another program's messages, are
+    listed.
     """
     check_use(context, "--out axis.toml", _OF_CONFIGURATION, _OF_BOTH)
     if out is not None:
@@ -90,6 +94,9 @@ def inspect_command(
             log, out, given, estimator=estimator, average=average, fit=fit, rate=rate, time=time, dbc=dbc,
             yes=yes, force=force, as_json=as_json,
         )  # fmt: skip
+        return
+    if is_live(log):
+        show_survey(log, as_json=as_json)
         return
     _check(excitation, output, input_, lines, window)
     from livebode.preparation import inspect  # with its statistics half a second to import
@@ -188,7 +195,8 @@ def _show_recording(found: Inspection, console: Console) -> None:
             extent = ["empty", ""]
         elif channel.minimum == channel.maximum:
             extent[1] = "constant"
-        table.add_row(channel.name, channel.unit, channel.kind, *extent, str(channel.not_finite or ""))
+        unit = f"{channel.unit} (from {channel.source_unit})" if channel.source_unit else channel.unit
+        table.add_row(channel.name, unit, channel.kind, *extent, str(channel.not_finite or ""))
     # A name that is shortened to the width of the terminal cannot be given to a run.
     console.width = max(
         console.width, Measurement.get(console, console.options.update(max_width=_WIDTH_MAX), table).maximum

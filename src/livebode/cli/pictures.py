@@ -13,8 +13,9 @@ from shutil import get_terminal_size
 from typing import TYPE_CHECKING, Any
 
 from livebode.cli.terminal import is_terminal, print_drawn
-from livebode.core import RunClock, counted, install_command, moment, moments_by
+from livebode.core import RunClock, counted, install_command, moment, moments_by, with_bound
 from livebode.estimates import rule
+from livebode.language import QUANTITY_NAMES, quantity_name
 from livebode.locations import original
 
 if TYPE_CHECKING:
@@ -64,9 +65,9 @@ def draw_titled(estimate: SingleResponse, into: Path, *, title: str, names: tupl
         return
     from livebode.pictures import save_pictures  # with Matplotlib half a second to import
 
-    schedule, fitted = estimate.schedule_label, estimate.fit
+    schedule, fitted, mean = estimate.schedule_label, estimate.fit, estimate.average
     with _ONE_AT_A_TIME:
-        save_pictures(responses, into, title=title, schedule_name=schedule, names=names, fitted=fitted)
+        save_pictures(responses, into, title=title, schedule_name=schedule, names=names, fitted=fitted, mean=mean)
 
 
 def load_beside() -> None:
@@ -92,6 +93,7 @@ def show(outcome: Outcome) -> None:
             height=max(16, min(size.lines - 4, 36)),
             colour=is_terminal() and "NO_COLOR" not in os.environ,
             unicode="utf" in (sys.stdout.encoding or "").lower(),
+            mean=outcome.average,
         )
     )
     print(f"{tracked_amount(outcome.summary)}\n{original(str(outcome.directory))}/")
@@ -159,9 +161,9 @@ def _show_moving(model: dict[str, Any]) -> None:
     """Print the model of the newest chunk of an axis in motion."""
     at, stiffness, damping = model["position_m"], model["stiffness_n_per_m"], model["damping_n_s_per_m"]
     print(
-        f"\naxis in motion, newest chunk: Js {model['inertia_kg_m2']:.5g} kg m², mL {model['load_kg']:.5g} kg, "
-        f"Keff {stiffness[0]:.4g} … {stiffness[-1]:.4g} N/m and bs {damping[0]:.4g} … {damping[-1]:.4g} N s/m "
-        f"from {at[0]:.4g} to {at[-1]:.4g} m"
+        f"\naxis in motion, newest chunk: motor inertia {model['inertia_kg_m2']:.5g} kg m², load mass "
+        f"{model['load_kg']:.5g} kg, belt stiffness {stiffness[0]:.4g} … {stiffness[-1]:.4g} N/m and belt damping "
+        f"{damping[0]:.4g} … {damping[-1]:.4g} N s/m from {at[0]:.4g} to {at[-1]:.4g} m"
     )
 
 
@@ -205,14 +207,21 @@ def show_fit(found: Fit, of: str) -> None:
         print(f"  no parameters ({found.status}): {found.sentence}")
         return
     for name, value, bound, unit in found.rows():
+        words = _with_symbol(name)
         if (limit := found.at_most(name)) is not None:
-            print(f"  {name:22}{'≤':>3}{limit:>9.2g}   {'':10}{unit}")
+            print(f"  {words:28}{'≤':>3}{limit:>9.2g}   {'':12}{unit}")
             continue
-        around = f"± {bound:<10.2g}" if bound else f"{'fixed':12}"
-        print(f"  {name:22}{value:>12.5g} {around}{unit}")
+        text, half = with_bound(value, bound)
+        around = f"± {half:<12}" if bound else f"{half:14}"
+        print(f"  {words:28}{text:>12} {around}{unit}")
     chi2 = "" if isnan(found.chi2) else f"; reduced chi² {found.chi2:.3g} from sigma alone"
     print(f"  {found.about_bounds}")
     print(f"  model error ε = {100 * found.epsilon:.2g} % of |G|{chi2}")
+
+
+def _with_symbol(name: str) -> str:
+    """The words for a quantity, with the symbol that options and files have for it."""
+    return f"{quantity_name(name)} {name}" if name in QUANTITY_NAMES else quantity_name(name)
 
 
 def show_poles(found: CommonPoles) -> None:
@@ -224,7 +233,8 @@ def show_poles(found: CommonPoles) -> None:
         return
     print(f"  {found.about_order}")
     for name, value, bound, unit in found.rows():
-        print(f"  {name:28}{value:>12.5g} ± {bound:<10.2g}{unit}")
+        text, half = with_bound(value, bound)
+        print(f"  {_with_symbol(name):28}{text:>12} ± {half:<12}{unit}")
     print(f"  {found.about_bounds}")
     for name, epsilon, chi2 in zip(found.outputs, found.epsilon, found.chi2):
         words = "" if isnan(chi2) else f"; reduced chi² {chi2:.3g} from sigma alone"

@@ -74,7 +74,10 @@ def run_command(
     ] = False,
     band: Band = None,
     out: Annotated[
-        str | None, typer.Option(metavar="DIR", help="Run directory, or its URL. \\[default: runs/<name>]")
+        str | None,
+        typer.Option(
+            metavar="DIR", help="Run directory, or its URL. \\[default: runs/<name>, or the next free runs/<name>-2]"
+        ),
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace an existing run in that directory.")] = False,
     go_on: Annotated[

@@ -28,7 +28,7 @@ from livebode.core import ConfigError, LocationError, RecordError, UsageError
 from livebode.estimates import rule
 from livebode.locations import Location, Url, local_copy, location, original
 from livebode.records import check_removable, is_run, to_json
-from livebode.runtime import Destination, Document, Outcome, StoppedError, Subscriber, TrackerResults, run
+from livebode.runtime import Destination, Document, Outcome, StoppedError, Subscriber, TrackerResults, next_run, run
 from livebode.sources import read_head
 
 if TYPE_CHECKING:
@@ -73,8 +73,12 @@ def run_targets(
     axes: Axes = _axes(places, over, each) if file is None else file.read()
     live = any(axis.source.live for axis in axes.values())
     alone = axes.get("")
-    place = Path("runs") / target.stem if out is None else location(out)
     segments = live or any(axis.record is not None for axis in axes.values())
+    place: Location = Path("runs") / target.stem
+    if out is not None:
+        place = location(out)
+    elif not force and (live or not segments):  # the record of a recording with a journal continues
+        place = next_run(Path("runs") / target.stem, axes)
     with recorded_at(place, segments=segments) as (directory, send):
         if alone is None:
             _check_places(directory, axes, force=force)

@@ -43,8 +43,8 @@ class SectionKey(NamedTuple):
 def key_help(key: str) -> str:
     """Help of an option that sets a key, such as "source.rate_hz".
 
-    >>> key_help("tracking.forgetting")
-    'Weight of a period relative to the next one; 1 forgets nothing. \\\\[default: 0.8; x>0; x<=1]'
+    >>> key_help("lines.window")
+    'Length of the window in samples. "auto": the measured period of the excitation. \\\\[default: auto; x>=3]'
     """
     section, _, name = key.partition(".")
     return _keys(section)[name].help

@@ -48,7 +48,8 @@ class PIDSection(_ControllerSection):
     Parameters
     ----------
     gain
-        Proportional gain: of [loop.velocity] in units of the input per unit of velocity, of [loop.position] in 1/s.
+        Proportional gain: of [loop.velocity] in SI units of the input and the velocity, such as N m s/rad, to which a
+        source's units are converted; of [loop.position] in 1/s.
     integral_time_s
         Integral time Ti in seconds. Default: no integrator.
     derivative_time_s
@@ -74,7 +75,7 @@ class PositionPDSection(_ControllerSection):
     position_gain
         Position gain kp in 1/s.
     velocity_gain
-        Velocity gain kv, in units of the input per unit of velocity.
+        Velocity gain kv, in SI units of the input and the velocity, such as N m s/rad.
     smoothed
         D is the difference of the means of two neighbouring positions.
     """

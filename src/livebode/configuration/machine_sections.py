@@ -85,7 +85,7 @@ class OrdersSection(ConfigurationSection):
     angle
         Channel of the motor's angle. Default: signals.output, or its integral if it is a velocity.
     turn
-        Units of the angle in one turn of the motor. Default: 2π.
+        Angle of one turn of the motor, in rad, or in the unit of a channel that has no SI unit. Default: 2π.
     shafts
         Turns of each shaft in one turn of the motor: {gear = 0.2}. "motor" has 1.
     orders

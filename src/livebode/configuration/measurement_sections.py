@@ -201,7 +201,7 @@ class TrackingSection(ConfigurationSection):
     average
         Average over the previous periods, weighted by forgetting, instead of using only the newest window.
     forgetting
-        Weight of a period relative to the next one; 1 forgets nothing.
+        Weight of a period relative to the next one; 1 forgets nothing. Default: 0.8; 1 for the average of a recording.
     noise
         Source of the bounds. "auto": the scatter between periods and, where the schedule moves, the detection lines
         (non-excited bins). "periods": always the scatter. "quiet": the larger of the two at standstill.
@@ -226,7 +226,7 @@ class TrackingSection(ConfigurationSection):
     quantity: Quantity = "plant"
     hop: Annotated[int, Field(ge=1)] | None = None
     average: bool = False
-    forgetting: Annotated[float, Field(gt=0, le=1)] = 0.8
+    forgetting: Annotated[float, Field(gt=0, le=1)] | None = None
     noise: Literal["auto", "periods", "quiet"] = "auto"
     differenced: list[str] = []
     hann: bool = False

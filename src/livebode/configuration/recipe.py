@@ -8,7 +8,7 @@ import json
 from livebode.configuration.axis import Axis
 from livebode.records import content_sha256
 
-_READING = {"time", "clock", "from_", "to", "skip_periods", "dbc", "rate_hz", "kinds"}
+_READING = {"time", "clock", "from_", "to", "skip_periods", "dbc", "rate_hz", "kinds", "units"}
 _APART = {"source", "serve", "record", "report", "machine", "publish"}
 _DIGITS = 16
 

@@ -60,6 +60,7 @@ from livebode.core.distributions import normal_quantile as normal_quantile
 from livebode.core.distributions import sum_exceeded as sum_exceeded
 from livebode.core.distributions import t_quantile as t_quantile
 from livebode.core.document import TONES as TONES
+from livebode.core.document import Answer as Answer
 from livebode.core.document import Document as Document
 from livebode.core.document import Finding as Finding
 from livebode.core.document import Listing as Listing

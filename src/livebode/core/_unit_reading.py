@@ -6,7 +6,7 @@ import re
 import unicodedata
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from math import pi
+from math import inf, pi
 from typing import Literal, get_args
 
 QuantityKind = Literal["torque", "force", "current", "velocity", "position", "acceleration", "other"]
@@ -125,9 +125,8 @@ def read_quantity(text: str) -> UnitReading:
         return reading
     reading, number = read_unit(written["unit"]), float(written["number"])
     divisor = float(written["divisor"] or 1)
-    if not reading.si or not number or not divisor:
-        return UnitReading()
-    return replace(reading, factor=number / divisor * reading.factor)
+    factor = number / divisor * reading.factor if divisor else 0.0
+    return replace(reading, factor=factor) if reading.si and 0 < factor < inf else UnitReading()
 
 
 def split_plant_unit(text: str) -> tuple[str, str]:

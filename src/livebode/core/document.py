@@ -31,12 +31,26 @@ TONES: Mapping[str, str] = {
 """The verdict that is printed for each tone."""
 
 
+Subject = Literal["machine", "measurement"]
+
+
 @dataclass(frozen=True)
 class Finding:
-    """One sentence of the verdict, and how urgent it is."""
+    """One sentence, how urgent it is, and whether it is about the machine or about how well it was measured."""
 
     tone: Tone
     text: str
+    subject: Subject = "machine"
+
+
+@dataclass(frozen=True)
+class Answer:
+    """A quantity that was measured, its value with bound and unit, and the result of its limit, if it has one."""
+
+    name: str
+    value: str
+    limit: str = ""
+    tone: Tone | None = None
 
 
 @dataclass(frozen=True)
@@ -97,7 +111,7 @@ class Logo:
 
 @dataclass(frozen=True)
 class Document:
-    """A report: a first page with the result, findings, sections, and an appendix.
+    """A report: a first page with the answers and the verdict, findings, sections, and an appendix.
 
     Attributes
     ----------
@@ -117,6 +131,9 @@ class Document:
         Heading of the findings.
     tones
         The verdict that is printed for each tone, so that it is legible without colours.
+    answers, about_answers
+        What was measured, the most important quantity first: the largest text of the first page. And what its bounds
+        cover.
     result
         The findings of the first page: the first is the verdict of the report.
     picture
@@ -124,7 +141,7 @@ class Document:
     signatures
         What each signature line is for.
     appendix
-        Sections after the report itself: raw configuration, versions.
+        Sections after the report itself: long tables, what was left out, raw configuration, versions.
     logo
         Shown at the top of the first page.
     paper
@@ -141,6 +158,8 @@ class Document:
     foot: str = ""
     heading: str = ""
     tones: Mapping[str, str] = field(default_factory=lambda: TONES)
+    answers: tuple[Answer, ...] = ()
+    about_answers: str = ""
     result: tuple[Finding, ...] = ()
     picture: Picture | None = None
     signatures: tuple[str, ...] = ()

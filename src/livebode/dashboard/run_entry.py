@@ -32,7 +32,8 @@ class RunEntry:
     name
         Name of its directory.
     state
-        "finished", "recording" (its files change), "stopped" before its end, "broken" (it cannot be read: `message`).
+        "finished" (its source or a person ended it), "recording" (its files change), "stopped" before its end, "broken"
+        (it cannot be read: `message`).
     machine, recording, signals
         As configured: its path in [machine], its name in [report], or the address of its source; the file; the
         channels. Empty if unknown.
@@ -101,8 +102,9 @@ def grows(newest: Mapping[str, float]) -> bool:
 
 def _readable(run: Path, summary: dict[str, Any], size: int, newest: dict[str, float]) -> RunEntry:
     settings, configuration = summary["found"], summary.get("configuration", {})
-    finished = bool(summary.get("record", {}).get("finished", True))
-    state: RunState = "finished" if finished else "recording" if grows(newest) else "stopped"
+    record = summary.get("record", {})
+    ended = bool(record.get("finished", True) or record.get("ended", False))
+    state: RunState = "finished" if ended else "recording" if grows(newest) else "stopped"
     recorded_s = summary.get("speed", {}).get("recorded_s")
     frequencies = settings.get("frequency_hz") or [
         k * settings["rate_hz"] / settings["window"] for k in settings.get("bins", [])

@@ -105,7 +105,8 @@ def check_run(subject: Subject) -> Check:
         events = sum(1 for _ in run.each_event())
     except LivebodeError as error:
         return Check.of_error(RUN, error)
-    state = "finished" if run.finished else "being recorded, or ended by a kill"
+    open_run = "ended; the same command continues it" if run.ended else "being recorded, or ended by a kill"
+    state = "finished" if run.finished else open_run
     message = f"{subject.run_path}: {state}; {counted(responses)}, {counted(events, 'event')}"
     facts = {"finished": run.finished, "responses": responses, "events": events, "damages": len(run.damages)}
     if run.damages:

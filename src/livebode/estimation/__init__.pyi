@@ -36,6 +36,7 @@ from livebode.estimation.tracker import SuccessiveTrackers as SuccessiveTrackers
 from livebode.estimation.tracker import Tracker as Tracker
 from livebode.estimation.tracker import contains as contains
 from livebode.estimation.tracker_settings import DETECTION_LINES_MIN as DETECTION_LINES_MIN
+from livebode.estimation.tracker_settings import FORGETTING as FORGETTING
 from livebode.estimation.tracker_settings import WINDOWS as WINDOWS
 from livebode.estimation.tracker_settings import Role as Role
 from livebode.estimation.tracker_settings import Settings as Settings

@@ -112,6 +112,7 @@ class LineStage(StatefulBase):
             "bins": list(lines.bins),
             "quiet_bins": list(lines.quiet),
             "hop": self._settings.step,
+            **({"forgetting": self._settings.forgetting} if self._settings.average else {}),
             "judged": {"noise": self._settings.noise, "noise_from_detection_lines": self._moving}
             | ({"ripple": ripple} if ripple else {})
             | ({"not_repeating_hz": self._periodicity.not_repeating_hz()} if self._periodicity else {}),

@@ -74,6 +74,7 @@ class NonPeriodicStage(StatefulBase):
             "bins": list(lines.bins),
             "quiet_bins": list(lines.quiet),
             "hop": settings.step,
+            **({"forgetting": settings.forgetting} if settings.average else {}),
             "judged": {"noise": "bins" if settings.estimator == "lpm" else "windows"},
         }
 

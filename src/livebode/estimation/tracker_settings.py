@@ -52,6 +52,8 @@ ESTIMATORS = {estimator.name: estimator for estimator in (DIRECT, JOINT, INDIREC
 
 WINDOWS = 8
 """Windows of Welch's method in the samples of one response."""
+FORGETTING = 0.8
+"""Default weight of a period relative to the next one: about nine periods are remembered."""
 DETECTION_LINES_MIN = 4
 """Smallest number of detection lines for an estimate of the noise."""
 
@@ -122,7 +124,7 @@ class Settings:
     quantity: Quantity = "plant"
     hop: int | None = None
     average: bool = False
-    forgetting: float = 0.8
+    forgetting: float = FORGETTING
     noise: Literal["auto", "periods", "quiet"] = "auto"
     differenced: tuple[str, ...] = ()
     hann: bool = False

@@ -20,6 +20,7 @@ from livebode.fitting.least_squares import minimise as minimise
 from livebode.fitting.mean import RunningMean as RunningMean
 from livebode.fitting.mean import mean_matrix as mean_matrix
 from livebode.fitting.mean import mean_response as mean_response
+from livebode.fitting.mean import with_drift as with_drift
 from livebode.fitting.mean_of_recordings import RecordingScatter as RecordingScatter
 from livebode.fitting.mean_of_recordings import RecordingsMean as RecordingsMean
 from livebode.fitting.models import model_named as model_named
@@ -42,6 +43,7 @@ from livebode.fitting.problem import described as described
 from livebode.fitting.rational import Rational as Rational
 from livebode.fitting.rational import fit_rational as fit_rational
 from livebode.fitting.rational import rational_of as rational_of
+from livebode.fitting.rows import NO_RESPONSE as NO_RESPONSE
 from livebode.fitting.separable import Outputs as Outputs
 from livebode.fitting.separable import SeparatedFit as SeparatedFit
 from livebode.fitting.separable import pole_price as pole_price

@@ -1,4 +1,4 @@
-"""Whether a machine significant during a record: a trend of the response at a line that noise does not explain."""
+"""Whether a machine drifts during a record: a trend of the response at a line that noise does not explain."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Flags, Floats
-from livebode.core import Lines, Responses, Stage, StatefulBase, sum_exceeded
+from livebode.core import Lines, Response, Responses, Stage, StatefulBase, sum_exceeded
 
 FALSE_ALARM = 0.01
 """Probability that a record of a machine that does not drift is reported, all lines together."""
@@ -38,7 +38,8 @@ class Drift:
         response; NaN at lines with fewer than six groups of windows.
     spread
         Part of the standard deviation of a mean over the record that the trend adds: the mean then covers the response
-        at a random moment of the record as often as noise; 0 unless `significant`.
+        at a random moment of the record as often as noise; 0 unless `significant`. Of averages with forgetting it is
+        that of the periods that the newest one remembers.
     """
 
     significant: bool
@@ -55,8 +56,12 @@ class DriftTest(StatefulBase):
     Windows that do not overlap are averaged in up to 32 groups of equal length. At each line a parabola over time is
     fitted to the groups, for the change as its straight part, and for the largest distance from the mean. Without
     drift, the power of the straight part over that of the residuals is F(2, 2d), with d the number of groups less
-    three, so that its probability is (1 + F/d)^-d. A record significant if one line has less than half of `FALSE_ALARM`
-    after Bonferroni, or all lines together have by Fisher's method.
+    three, so that its probability is (1 + F/d)^-d. A record is significant if one line has less than half of
+    `FALSE_ALARM` after Bonferroni, or all lines together have by Fisher's method.
+
+    Responses that average over periods are turned back into the windows that they gained. Of averages Gᵢ with the mean
+    times tᵢ of their windows, a window that has its centre at c and the share s of the average's weight gives
+    t₂ = t₁ + s·(c − t₁) and G₂ = G₁ + s·(G − G₁), so that s and G follow; the power of the input is taken as constant.
 
     Parameters
     ----------
@@ -71,17 +76,39 @@ class DriftTest(StatefulBase):
     """
 
     _stage = Stage("drift-test", 1)
-    _STATE = ("_windows", "_free", "_level", "_schedule", "_times_s", "_pairs")
+    _STATE = (
+        "_windows",
+        "_free",
+        "_level",
+        "_schedule",
+        "_times_s",
+        "_pairs",
+        "_begin",
+        "_average",
+        "_value",
+        "_share",
+    )
 
     def __init__(self, lines: Lines) -> None:
-        self._window, n = lines.window, len(lines)
+        self._window, self._rate_hz, n = lines.window, lines.rate_hz, len(lines)
         self._windows, self._free, self._level = 0, 0, 0
         self._schedule = np.full(2, np.nan)  # smallest and largest
         self._times_s = np.zeros((1, _GROUPS_MAX, n))  # sums over the valid windows
         self._pairs = np.zeros((3, _GROUPS_MAX, n), dtype=np.complex128)  # number, sums of numerator and denominator
 
+        self._begin = np.full(3, np.nan)  # first and newest sample, and time, of the first window
+        self._average = np.full(2, np.nan)  # time and schedule of the newest average
+        self._value = np.full(n, complex(np.nan, np.nan))  # of that
+        self._share = 1.0  # of the newest window in that
+
     def add(self, part: Responses) -> None:
         """Process the next responses."""
+        single = part.sample - part.first < self._window
+        if self._share == 1:
+            self._add_windows(part[single])
+        self._add_gained(part[~single & (part.first == self._begin[0])])
+
+    def _add_windows(self, part: Responses) -> None:
         chosen: list[int] = []
         index = int(np.searchsorted(part.first, self._free))
         while index < len(part):
@@ -89,21 +116,47 @@ class DriftTest(StatefulBase):
             self._free = int(part.sample[index]) + 1
             index = int(np.searchsorted(part.first, self._free))
         if chosen:
-            self._add(part[np.array(chosen)])
+            windows = part[np.array(chosen)]
+            if np.isnan(self._begin[0]) and (valid := windows.valid.any(axis=1)).any():
+                self._begin_with(windows[int(np.argmax(valid))])
+            weight = np.where(np.isfinite(windows.weight), windows.weight, 1.0)
+            self._add(windows.time_s, windows.schedule, np.where(windows.valid, windows.value, np.nan), weight)
 
-    def _add(self, windows: Responses) -> None:
-        low, high = np.fmin.reduce(windows.schedule), np.fmax.reduce(windows.schedule)
+    def _begin_with(self, window: Response) -> None:
+        self._begin = np.array([window.first, window.sample, window.time_s])
+        self._average = np.array([window.time_s, window.schedule])
+        self._value = np.where(window.valid, window.value, np.nan)
+
+    def _add_gained(self, averages: Responses) -> None:
+        """Add the windows that these averages gained, all at one place in the period."""
+        moments, values = [], []
+        for average in averages:
+            centre_s = self._begin[2] + (average.sample - self._begin[1]) / self._rate_hz
+            now = np.array([average.time_s, average.schedule])
+            share = (now[0] - self._average[0]) / (centre_s - self._average[0])
+            if share <= 0:  # a window that was excluded
+                continue
+            value = np.where(average.valid, average.value, np.nan)
+            moments.append(self._average + (now - self._average) / share)
+            values.append(self._value + (value - self._value) / share)
+            self._average, self._value, self._share = now, value, float(share)
+        if values:
+            time_s, schedule = np.array(moments).T
+            self._add(time_s, schedule, np.array(values), np.ones((len(values), self._value.size)))
+
+    def _add(self, time_s: Floats, schedule: Floats, value: Complex, weight: Complex | Floats) -> None:
+        """Add windows; `value` is NaN where it is invalid, shape (windows, lines)."""
+        low, high = np.fmin.reduce(schedule), np.fmax.reduce(schedule)
         self._schedule = np.array([np.fmin(self._schedule[0], low), np.fmax(self._schedule[1], high)])
-        used = windows.valid & np.isfinite(windows.value)
-        weight = np.where(np.isfinite(windows.weight), windows.weight, 1.0)
-        times_s = np.where(used, windows.time_s[:, np.newaxis], 0.0)
-        pairs = np.where(used, np.stack([np.ones_like(weight), windows.value * weight, weight]), 0)
+        used = np.isfinite(value)
+        times_s = np.where(used, time_s[:, np.newaxis], 0.0)
+        pairs = np.where(used, np.stack([np.ones_like(value), value * weight, weight + 0j]), 0)
         done = 0
-        while done < len(windows):
+        while done < len(value):
             if self._windows >> self._level == _GROUPS_MAX:
                 self._merge()
             group = self._windows >> self._level
-            stop = min(done + ((group + 1) << self._level) - self._windows, len(windows))
+            stop = min(done + ((group + 1) << self._level) - self._windows, len(value))
             self._times_s[:, group] = _added(self._times_s[:, group], times_s[np.newaxis, done:stop])
             self._pairs[:, group] = _added(self._pairs[:, group], pairs[:, done:stop])
             self._windows += stop - done
@@ -130,7 +183,8 @@ class DriftTest(StatefulBase):
         significant = bool(own.any() or together)
         with np.errstate(invalid="ignore", divide="ignore"):
             value = self._pairs[1].sum(axis=0) / self._pairs[2].sum(axis=0)
-        return Drift(significant, own, value, change, sigma, _WITHIN_SIGMA * farthest * significant)
+        remembered = min(1.0, 1 / self._share / max(self._windows, 1)) if self._share < 1 else 1.0
+        return Drift(significant, own, value, change, sigma, _WITHIN_SIGMA * farthest * remembered * significant)
 
     def _trend(self, line: int) -> tuple[complex, float, float, float] | None:
         """Change over the record, its sigma, the largest distance from the mean, and ln of the probability by chance.

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Floats
 from livebode.core import FitError, MatrixResponses, Response, Responses, SignalError
-from livebode.fitting.drift import DriftTest
+from livebode.fitting.drift import Drift, DriftTest
 
 _FIRST_VERDICT = 3  # windows that may be valid before the first verdict: three periods, of which two are complete
 
@@ -78,9 +78,11 @@ def mean_response(responses: Responses | Iterable[Responses]) -> Responses:
     A machine that drifts is averaged. If its drift is significant (`DriftTest`), sigma contains it without reduction,
     so that it covers the response at a random moment of the record.
 
+    Responses that average over periods already contain each other: of these the newest valid one is returned, with the
+    drift in its sigma.
+
     Bias: a change that returns to its beginning is averaged, and only its scatter is in sigma. With a Hann window the
-    errors correlate less, and sigma is too high. Responses that average over periods already contain each other: of
-    these the newest valid one is returned unchanged.
+    errors correlate less, and sigma is too high.
 
     Parameters
     ----------
@@ -165,6 +167,11 @@ class RunningMean:
 
     def response(self) -> Responses:
         """The present mean; SignalError where no line was ever valid, or each was found invalid."""
+        average = self._average()
+        return with_drift(average, self.drift.result()) if self.averages else average
+
+    def _average(self) -> Responses:
+        """The same, without the drift where the responses average already."""
         newest, verdict = self._newest, self._verdict
         if newest is None or verdict is None:
             raise SignalError("no-valid-response", "none of the responses is valid at any line", "track more periods")
@@ -184,7 +191,7 @@ class RunningMean:
 
         Sigma is NaN at a line with fewer than two windows.
         """
-        response = self.response()[0]
+        response = self._average()[0]
         if self.averages:
             of_noise = np.sqrt(np.maximum(response.sigma**2 - np.nan_to_num(response.distortion, posinf=0.0) ** 2, 0.0))
             return replace(response, sigma=of_noise), response.weight
@@ -230,6 +237,11 @@ class RunningMean:
             input_coherence=self._input_coherence.value[np.newaxis],
             distortion=np.where(valid & np.isfinite(distortion), distortion, np.nan)[np.newaxis],
         )
+
+
+def with_drift(average: Responses, drift: Drift) -> Responses:
+    """An average over periods whose sigma contains the drift of the machine meanwhile."""
+    return replace(average, sigma=np.hypot(average.sigma, drift.spread))
 
 
 def _without(response: Responses, lines: NDArray[np.bool_]) -> Responses:

@@ -169,7 +169,7 @@ class RecordingsMean:
                 continue
             responses.append(response)
             weights.append(np.where(np.isfinite(weight), weight, 1.0))
-            spread = np.zeros(len(response.lines)) if mean.averages else mean.drift.result().spread
+            spread = mean.drift.result().spread
             distortion = np.where(np.isfinite(response.distortion) & (not self.realisations), response.distortion, 0.0)
             repeated.append(spread**2 + distortion**2)
         valid = np.array([response.valid for response in responses])

@@ -1,10 +1,12 @@
 from livebode.language.message import Message as Message
 from livebode.language.message import Moment as Moment
 from livebode.language.message import for_page as for_page
+from livebode.language.message import quantity_name as quantity_name
 from livebode.language.message import recorded as recorded
 from livebode.language.message import worded as worded
 from livebode.language.negotiation import catalogue_for_page as catalogue_for_page
 from livebode.language.negotiation import negotiated as negotiated
+from livebode.language.quantity_names import QUANTITY_NAMES as QUANTITY_NAMES
 from livebode.language.translation import ENGLISH as ENGLISH
 from livebode.language.translation import Catalogue as Catalogue
 from livebode.language.translation import available as available

@@ -98,6 +98,15 @@ def worded(text: str) -> str:
     return _worded(text, current_language())
 
 
+def quantity_name(name: str) -> str:
+    """The words for a fitted quantity, in the language in use; files and Python have its symbol or name.
+
+    >>> quantity_name("Keff"), quantity_name("resonance_damping"), quantity_name("phase_margin")
+    ('belt stiffness', 'resonance damping ratio', 'phase margin')
+    """
+    return worded(name.replace("_", " "))
+
+
 def recorded(plain: Mapping[str, Any], text: str) -> str:
     """The message with this plain form, which was recorded beside its English `text`; that, where there is none.
 

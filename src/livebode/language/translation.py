@@ -14,6 +14,8 @@ from importlib.resources import files
 from numbers import Real
 from typing import Any
 
+from livebode.language.quantity_names import QUANTITY_NAMES
+
 _PLURAL_PERIOD = 100
 
 
@@ -59,7 +61,7 @@ class Catalogue:
         return str(forms[int(self.plural[digit])])
 
 
-ENGLISH = Catalogue("en", "English")
+ENGLISH = Catalogue("en", "English", messages=QUANTITY_NAMES)
 
 
 @cache

@@ -41,7 +41,7 @@ class FrictionCurve:
         asymmetry (Fv forward minus Fv backward, halved; only in `directions`), and stribeck Fs, stribeck_speed vs if
         found.
     value, covariance
-        Shape (parameters,) and (parameters, parameters), in the units of the recording.
+        Shape (parameters,) and (parameters, parameters), in SI units.
     dof
         Degrees of freedom of each variance, shape (parameters,).
     places

@@ -113,7 +113,7 @@ class SmoothMotion:
     Attributes
     ----------
     input, velocity, acceleration
-        Smoothed, in the units of the recording and per second.
+        Smoothed, in SI units and per second.
     position
         Where the axis is, from the recording or the integral of its velocity.
     sign

@@ -50,7 +50,7 @@ def bode_figure(
     fitted
         The newest fit, or the fit of the mean; drawn from the first to the last line.
     mean
-        The mean of the run; drawn with its 95 % bound instead of the median and the newest response.
+        The mean of the run; drawn alone with its 95 % bound, instead of median, range and newest response.
     dark
         Whether to draw light on dark.
     """
@@ -61,15 +61,15 @@ def bode_figure(
         figure = new_figure(9.0, 7.6 if coherent else 6.6)
         heading(figure, look, title or tr("Bode plot"), words.facts(responses, summary.count, names), _LEFT)
         magnitude, phase, *lowest = _panels(figure, coherent)
-        _draw(magnitude, look, summary, summary.magnitude_db, *_newest_db(summary), mean is None)
-        _draw(phase, look, summary, summary.phase_deg, *_newest_deg(summary), mean is None)
+        _draw(magnitude, look, summary, None if mean else summary.magnitude_db, *_newest_db(summary))
+        _draw(phase, look, summary, None if mean else summary.phase_deg, *_newest_deg(summary))
         magnitude.set_ylabel(words.magnitude_label(responses, 46))
         phase.set_ylabel(tr("phase in degrees"))
         if lowest:
-            _draw(lowest[0], look, summary, summary.coherence, *_newest_coherence(summary), mean is None)
+            _draw(lowest[0], look, summary, None if mean else summary.coherence, *_newest_coherence(summary))
             lowest[0].set_ylabel(tr("coherence γ²"))
         curve = _curve(summary, fitted) if fitted is not None and summary.count else None
-        _scales(look, summary, curve, magnitude, phase, *lowest)
+        _scales(look, summary, curve, mean is not None, magnitude, phase, *lowest)
         if summary.count:
             if curve is not None:
                 line: dict[str, Any] = {
@@ -129,15 +129,14 @@ def _newest_coherence(summary: Summary) -> tuple[Floats, Floats, Floats]:
 
 
 def _draw(
-    axes: Axes, look: Style, summary: Summary, run: Floats, value: Floats, low: Floats, high: Floats, median: bool
+    axes: Axes, look: Style, summary: Summary, run: Floats | None, value: Floats, low: Floats, high: Floats
 ) -> None:
-    """Draw one panel: range, median, newest; `run` is (3, lines), the others (lines,)."""
+    """Draw one panel: range, median, newest; `run` is (3, lines) or None, the others (lines,)."""
     f = summary.responses.lines.frequency_hz
     few = len(f) <= FEW_LINES
     run_marker: dict[str, Any] = {"marker": "o", "markersize": 4.5} if few else {}
-    if summary.count > 1:
+    if summary.count > 1 and run is not None:
         band(axes, f, run[0], run[2], look.run, 0.2, gid="span")
-    if summary.count > 1 and median:
         axes.plot(f, run[1], color=look.run, linewidth=1.6, zorder=3, gid="median", **run_marker)
     bound(axes, f, low, high, look.newest, gid="bound")
     if few:
@@ -148,7 +147,7 @@ def _draw(
         axes.plot(f[single], value[single], color=look.newest, linestyle="", marker="o", markersize=3, zorder=4)
 
 
-def _scales(look: Style, summary: Summary, curve: tuple[Floats, ...] | None, *panels: Axes) -> None:
+def _scales(look: Style, summary: Summary, curve: tuple[Floats, ...] | None, mean: bool, *panels: Axes) -> None:
     from livebode.pictures.scales import frequency_axis
 
     magnitude, phase, *lowest = panels
@@ -158,10 +157,9 @@ def _scales(look: Style, summary: Summary, curve: tuple[Floats, ...] | None, *pa
         frequency_axis(axes, summary.responses.lines.frequency_hz, labels=axes is panels[-1])
     panels[-1].set_xlabel(tr("frequency in Hz"))
     _, db, deg = curve or (np.zeros(0), np.zeros(0), np.zeros(0))
-    _limits(magnitude, summary.magnitude_db, _newest_db(summary), db, room=3.0)
-    low_deg, high_deg = _limits(
-        phase, np.concatenate([summary.phase_deg.ravel(), deg]), _newest_deg(summary), deg, room=10.0
-    )
+    run_db, run_deg = (np.zeros(0), np.zeros(0)) if mean else (summary.magnitude_db, summary.phase_deg)
+    _limits(magnitude, run_db, _newest_db(summary), db, room=3.0)
+    low_deg, high_deg = _limits(phase, np.append(run_deg, deg), _newest_deg(summary), deg, room=10.0)
     phase.set_yticks(ticks.phase_ticks(low_deg, high_deg))
     if lowest:
         lowest[0].set_ylim(-0.04, 1.06)
@@ -198,19 +196,18 @@ def _legend(figure: Figure, look: Style, summary: Summary, fit: bool, mean: bool
     assert summary.newest is not None
     few = len(summary.responses.lines) <= FEW_LINES
     handles: list[Any] = []
-    if summary.count > 1:
+    texts: list[str] = []
+    if summary.count > 1 and not mean:
         handles = [
             Line2D([], [], color=look.run, linewidth=1.6, marker="o" if few else "", markersize=4.5),
             Patch(facecolor=look.run, alpha=0.25),
         ]
+        texts = [
+            trn("median of {n} response with a valid line", "median of {n} responses with a valid line", summary.count),
+            tr("5–95 % of them"),
+        ]
     mark: dict[str, Any] = {"linestyle": "", "marker": "+", "markersize": 10, "markeredgewidth": 1.8} if few else {}
     handles.append(Line2D([], [], color=look.newest, linewidth=1.6, **mark))
-    median = trn(
-        "median of {n} response with a valid line", "median of {n} responses with a valid line", summary.count
-    )  # fmt: skip
-    texts = [median, tr("5–95 % of them")][: len(handles) - 1]
-    if mean:
-        handles, texts = handles[len(texts) // 2 :], [tr("5–95 % of the responses")] * (len(texts) // 2)
     at_s = summary.newest.time_s
     newest = tr("newest, at {time}", time=moment(at_s, 2))
     if np.isfinite(summary.newest_bound).any():

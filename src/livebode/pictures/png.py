@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from livebode.core import Model, Responses, whole_file
+from livebode.core import Model, Response, Responses, whole_file
 from livebode.pictures._style import Style, drawing, quiet_about_letters, style
 
 if TYPE_CHECKING:
@@ -26,9 +26,12 @@ def save_pictures(
     schedule_name: str = "",
     names: tuple[str, str] | None = None,
     fitted: Model | None = None,
+    mean: Response | None = None,
     dark: bool = False,
 ) -> list[Path]:
     """Write bode.png and tracking.png to an existing directory and return their paths.
+
+    bode.png shows the run's `mean` alone, if there is one.
 
     The same responses give the same bytes: the files contain no date and no version.
 
@@ -41,10 +44,12 @@ def save_pictures(
     from livebode.pictures.tracking import tracking_figure
 
     assessed = responses[responses.ready] if responses.ready.any() else responses
+    if mean is not None:
+        assessed = Responses.of(mean)
     look = style(dark)
     with drawing(look):
         pictures = {
-            "bode.png": bode_figure(assessed, title=title, names=names, fitted=fitted, dark=dark),
+            "bode.png": bode_figure(assessed, title=title, names=names, fitted=fitted, mean=mean, dark=dark),
             "tracking.png": tracking_figure(responses, title=title, schedule_name=schedule_name, dark=dark),
         }
         return [save(figure, Path(directory) / name, look) for name, figure in pictures.items()]

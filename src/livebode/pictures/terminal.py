@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from rich.style import Style
 
 from livebode.arrays import Floats
-from livebode.core import Responses, counted
+from livebode.core import Response, Responses, counted
 from livebode.pictures import ticks, words
 from livebode.pictures._style import shortened
 from livebode.pictures.curves import Summary, summarised
@@ -29,12 +29,20 @@ _PLAIN = str.maketrans(
 
 
 def terminal_bode(
-    responses: Responses, width: int = 80, height: int = 24, colour: bool = True, unicode: bool = True
+    responses: Responses,
+    width: int = 80,
+    height: int = 24,
+    colour: bool = True,
+    unicode: bool = True,
+    *,
+    mean: Response | None = None,
 ) -> str:
     """Magnitude in dB above phase in degrees over logarithmic frequency: the medians over the run, as text.
 
     Parameters
     ----------
+    mean
+        The average of the run; drawn instead of the medians.
     width, height
         Columns and lines of the terminal; the text is never wider or higher. Below 40 × 16, and if no response is
         valid or all are 0, one sentence replaces the plot.
@@ -43,8 +51,11 @@ def terminal_bode(
     unicode
         False uses only ASCII, for terminals whose encoding is not UTF-8.
     """
-    summary = summarised(responses)
+    summary = summarised(responses if mean is None else Responses.of(mean))
     middle = f"{words.quantity(responses)}: median of {counted(summary.count, 'response')} with a valid line"
+    if mean is not None:
+        seconds = (mean.sample - mean.first + 1) / mean.lines.rate_hz
+        middle = f"{words.quantity(responses)}: average over {seconds:.4g} s"
     if not summary.count:
         middle = f"{words.quantity(responses)}: no valid response"
     caption = written(f"{middle}, {words.lines_phrase(responses)}", width, unicode)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from livebode.core import MatrixResponses, Response, Responses, moment, moment_of_start
-from livebode.language import Message, numerals, tr, trn, worded
+from livebode.language import Message, numerals, quantity_name, tr, trn, worded
 from livebode.pictures._style import shortened
 from livebode.pictures.ticks import frequency_label
 
@@ -56,7 +56,7 @@ def facts(responses: Responses, valid_rows: int, names: tuple[str, str] | None =
 
 def labelled(name: str, unit: str) -> str:
     """A quantity with its unit."""
-    text = worded(name.replace("_", " "))
+    text = quantity_name(name)
     return tr("{name} in {unit}", name=text, unit=worded(unit)) if unit else text
 
 

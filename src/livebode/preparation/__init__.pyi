@@ -33,6 +33,7 @@ from livebode.preparation.plan import roles_in_doubt as roles_in_doubt
 from livebode.preparation.plan import window_in_doubt as window_in_doubt
 from livebode.preparation.proposal import Guess as Guess
 from livebode.preparation.proposal import Proposals as Proposals
+from livebode.preparation.proposal import Recorded as Recorded
 from livebode.preparation.quiet import Quiet as Quiet
 from livebode.preparation.quiet import silences as silences
 from livebode.preparation.recordings import check_same as check_same

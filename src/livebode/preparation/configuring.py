@@ -36,10 +36,15 @@ class Settled:
         lines = [f"# Written by `livebode inspect` from {recording}."]
         for section, table in self.tables.items():
             lines += ["", f"[{section}]"]
+            parts = {key: value for key, value in table.items() if isinstance(value, dict)}
             for key, value in table.items():
+                if key in parts:
+                    continue
                 line = tomli_w.dumps({key: value}).strip()
                 comment = self.comments.get((section, key), "")
                 lines.append(f"{line:<{_COLUMN - 1}} # {comment}" if comment else line)
+            for key, part in parts.items():
+                lines += ["", tomli_w.dumps({section: {key: part}}).strip()]
         return "\n".join(lines) + "\n"
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from livebode.core import Block, QuantityKind, RecordingError
+from livebode.core import Block, Channel, QuantityKind, RecordingError
 from livebode.sources import Log, Skipped, UnevenLog
 
 _UNREADABLE_MAX = 16
@@ -16,14 +16,23 @@ _UNREADABLE_MAX = 16
 
 @dataclass
 class ChannelSummary:
-    """One channel over the whole recording: range of its finite samples, and number of others."""
+    """One channel over the whole recording: range of its finite samples, and number of others.
+
+    `source_unit` is the unit in the file where the samples are in another one, else empty.
+    """
 
     name: str
     unit: str
     kind: QuantityKind
+    source_unit: str = ""
     minimum: float = float("inf")
     maximum: float = float("-inf")
     not_finite: int = 0
+
+    @classmethod
+    def of(cls, channel: Channel) -> ChannelSummary:
+        """Of a channel, before its samples."""
+        return cls(channel.name, channel.unit, channel.kind, channel.source_unit if channel.factor != 1 else "")
 
     def take(self, block: Block) -> None:
         samples = block[self.name]
@@ -69,7 +78,7 @@ def contents_of(log: Log, names: Sequence[str]) -> Contents:
     samples, gaps, missing, stop = 0, 0, 0, None
     for block in log.blocks(names):
         for channel in block.channels:
-            summaries.setdefault(channel.name, ChannelSummary(channel.name, channel.unit, channel.kind)).take(block)
+            summaries.setdefault(channel.name, ChannelSummary.of(channel)).take(block)
         samples += len(block)
         if stop is not None and (block.gap or block.start != stop):
             gaps, missing = gaps + 1, missing + block.start - stop
@@ -80,7 +89,7 @@ def contents_of(log: Log, names: Sequence[str]) -> Contents:
 def _uneven_contents(log: UnevenLog, names: Sequence[str]) -> Contents:
     """The same of the samples at their own times, in the common time of the channels."""
     labels = {channel.name: channel for channel in log.naming(names).channels}
-    found = {name: ChannelSummary(name, labels[name].unit, labels[name].kind) for name in names}
+    found = {name: ChannelSummary.of(labels[name]) for name in names}
     begin_s, end_s = log.first / log.rate_hz, log.stop / log.rate_hz
     for clock in log.clocks(names):
         channels = tuple(labels[name] for name in clock.channels)

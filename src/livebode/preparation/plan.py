@@ -9,7 +9,7 @@ import numpy as np
 
 from livebode.configuration import Axis
 from livebode.core import ANY_EXCITATION, Block, ConfigError, Event, Lines, LivebodeError
-from livebode.estimation import RippleOrder, Settings
+from livebode.estimation import FORGETTING, RippleOrder, Settings
 from livebode.language import Message
 from livebode.preparation.checks import check_length
 from livebode.preparation.roles import ROLES, check_distinct, check_roles
@@ -119,7 +119,7 @@ def settings_of(axis: Axis, rate_hz: float, lines: Lines, hop: int | None = None
         quantity=tracking.quantity,
         hop=hop or tracking.hop,
         average=tracking.average,
-        forgetting=tracking.forgetting,
+        forgetting=tracking.forgetting or (1.0 if tracking.average and not axis.source.live else FORGETTING),
         noise=tracking.noise,
         differenced=tuple(tracking.differenced),
         hann=tracking.hann,

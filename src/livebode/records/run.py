@@ -273,6 +273,11 @@ class RunRecord:
         """Whether its source ended and everything is written."""
         return bool(self.summary.get("record", {}).get("finished", True))
 
+    @property
+    def ended(self) -> bool:
+        """Whether it is complete: finished, or ended by a person or a service manager, from where it can continue."""
+        return self.finished or bool(self.summary["record"].get("ended", False))
+
     def responses(self) -> Responses:
         """All responses, as written; an empty batch before the first.
 

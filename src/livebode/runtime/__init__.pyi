@@ -36,6 +36,7 @@ from livebode.runtime.run_loop import RunLoop as RunLoop
 from livebode.runtime.session import Session as Session
 from livebode.runtime.single_response import SingleResponse as SingleResponse
 from livebode.runtime.status import Status as Status
+from livebode.runtime.successors import next_run as next_run
 from livebode.runtime.summary import counts_and_speed as counts_and_speed
 from livebode.runtime.summary import dated as dated
 from livebode.runtime.summary import of_log as of_log

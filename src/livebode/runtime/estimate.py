@@ -24,7 +24,7 @@ from livebode.runtime.documents import Document
 from livebode.runtime.run_counts import RunCounts
 
 if TYPE_CHECKING:
-    from livebode.core import MatrixResponses
+    from livebode.core import MatrixResponses, Response
     from livebode.fitting import Fit
     from livebode.runtime.feed import Feed, Source
     from livebode.runtime.readiness import Readiness
@@ -80,6 +80,8 @@ class Outcome:
         A thinned copy of its responses; None of an estimate without a single response.
     fit
         The newest valid fit.
+    average
+        The average of a run that averages; its result.
     matrix
         The newest matrix of a matrix run.
     """
@@ -88,6 +90,7 @@ class Outcome:
     summary: dict[str, Any]
     overview: Responses | None = None
     fit: Fit | None = None
+    average: Response | None = None
     matrix: MatrixResponses | None = None
 
     @property

@@ -50,7 +50,7 @@ def examined_recordings(axis: Axis, logs: Sequence[Log], to: Destination) -> Exa
     log = log.naming(estimate.channels)  # with the covariates of a baseline
     to.prepare()
     of, settings = examined(axis, log, follower), follower.settings
-    if settings.quantity == "plant" and settings.periodic and not settings.average:
+    if settings.quantity == "plant" and settings.periodic:
         estimate.drift = fitting.DriftTest(settings.lines)
     return ExaminedRecording(axis, of.source, estimate, of.found, log.clock_kind, dated(log), of.noticed)
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from livebode.configuration import Axis, without_null
+from livebode.configuration import NOT_RECORDED, Axis, without_null
 from livebode.core import RecordError
 
 EARLIER = "earlier_versions"
@@ -60,6 +60,14 @@ def check_same_run(
             written_by=writer,
             names=sorted(set(states) ^ set(parts)),
         )
+
+
+def continues(summary: Mapping[str, Any], axis: Axis) -> bool:
+    """Whether a run with this run.json is unfinished and of this axis, as the same command would continue it."""
+    if summary.get("record", {}).get("finished", True):
+        return False
+    now = axis.model_dump(mode="json", exclude=NOT_RECORDED, by_alias=True)
+    return _configuration(summary) == _configuration({"configuration": now})
 
 
 def earlier_versions(before: Mapping[str, Any], now: Mapping[str, Any]) -> dict[str, Any]:

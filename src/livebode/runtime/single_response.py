@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode import preparation
+from livebode import fitting, preparation
 from livebode.analysis import LIVE_VALUES_MAX, Overview
 from livebode.configuration import Axis
-from livebode.core import INTERVAL_FACTOR, Block, Channel, Event, Lines, LivebodeError, Responses, Stateful
+from livebode.core import INTERVAL_FACTOR, Block, Channel, Event, Lines, LivebodeError, Response, Responses, Stateful
 from livebode.estimation import Follower, Settings, plant_kinds, response_unit
 from livebode.language import Message
 from livebode.preparation import check_excitation, check_some_valid
@@ -65,7 +65,8 @@ def drift_events(drift: Mapping[str, Any], sample: int, time_s: float) -> list[E
     most = max(drift["lines"], key=lambda line: line["percent"])
     message = Message(
         "the response drifts during the recording, most at {line_hz:g} Hz: by {percent:.2g} % ± "
-        "{bound_percent:.1g} % from the beginning to the end; the bound of a mean contains the drift",
+        "{bound_percent:.1g} % from the beginning to the end; the bound of a mean contains the drift; for the machine "
+        "at one time, run a part of the recording (--from, --to)",
         line_hz=most["frequency_hz"],
         percent=most["percent"],
         bound_percent=INTERVAL_FACTOR * most["percent_sigma"],
@@ -135,6 +136,8 @@ class SingleResponse(Estimate):
         The scheduling signal's name with its unit, as soon as it has a run.
     fit
         The newest valid fit, at the end of the run.
+    average
+        The average of a run that averages, at its end, with a drift of the machine in its sigma.
     """
 
     tables: ClassVar = RESPONSE_TABLES
@@ -148,6 +151,7 @@ class SingleResponse(Estimate):
     readiness: Readiness | None = None
     schedule_label: str = field(default="", init=False)
     fit: Fit | None = field(default=None, init=False)
+    average: Response | None = field(default=None, init=False)
     _checks: LiveChecks | None = field(default=None, init=False)
     _ready: list[Block] = field(default_factory=list, init=False)
 
@@ -260,7 +264,7 @@ class SingleResponse(Estimate):
             newest = record.batches(SEEN_AGAIN_BYTES)
             first = next(newest, None) or record.responses()  # an empty batch contains the lines, unlike no run
             for responses in chain([first], newest):
-                self.overview.add(responses)
+                self._see(responses)
                 yield responses
                 if self.fits is not None:
                     yield FitResults(self.fits.process(responses[0:0])[0])  # sets the lines
@@ -312,7 +316,7 @@ class SingleResponse(Estimate):
     def documents(self, results: Responses) -> Iterator[Document]:
         """Responses, then of those that are assessed the fits and the alarms."""
         responses = results
-        self.overview.add(responses)
+        self._see(responses)
         if len(responses):
             yield responses
         if self.readiness is not None:
@@ -330,6 +334,22 @@ class SingleResponse(Estimate):
         shedding = self.shedding
         if self.detection is not None and (shedding is None or shedding.to_monitor(responses)):
             yield from self.detection.take_responses(responses, parameters)
+
+    def _see(self, responses: Responses) -> None:
+        """Take responses for the pictures, of the run or of the one that it continues."""
+        self.overview.add(responses)
+        if self.settings.average:
+            self.average = responses.newest() or self.average
+
+    def _average(self) -> Response | None:
+        """The result of a run that averages: of several recordings the mean, else the newest one."""
+        if self.average is None:
+            return None
+        if self.recordings is not None:
+            return self.recordings.response()[0]
+        if self.drift is None:
+            return self.average
+        return fitting.with_drift(Responses.of(self.average), self.drift.result())[0]
 
     def _fitted(self, fits: Fits, responses: Responses) -> tuple[tuple[Parameters, ...], list[Event]]:
         if self.shedding is None:
@@ -364,10 +384,11 @@ class SingleResponse(Estimate):
         if self.recordings is not None:
             done["between"] = of_recordings(self.recordings)
             events += between_events(done["between"], sample, time_s)
+        self.average = self._average()
         return done, events
 
     def outcome(self, directory: Path, summary: dict[str, Any]) -> Outcome:
-        return Outcome(directory, summary, self.overview.responses(), self.fit)
+        return Outcome(directory, summary, self.overview.responses(), self.fit, self.average)
 
 
 def _readiness(axis: Axis, settings: Settings) -> Readiness | None:

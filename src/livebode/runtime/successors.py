@@ -5,8 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from livebode.configuration import Axes
 from livebode.core import LivebodeError
 from livebode.records import read_summary
+from livebode.runtime.same_run import continues
 
 
 def newest(directory: Path) -> Path:
@@ -27,6 +29,30 @@ def free(directory: Path) -> Path:
     return path
 
 
+def next_run(directory: Path, axes: Axes) -> Path:
+    """Directory for another run of these axes whose place is not specified: NAME, or the first free NAME-2, NAME-3, …
+
+    Live sources continue the newest one instead, if it has their configuration: with another one, a new run begins.
+    """
+    last = directory
+    number = 1
+    while (path := _named(directory, number)).exists() or number == 1:
+        if "continues" not in _summary(path):
+            last = path
+        number += 1
+    if not directory.exists() or _continue(last, axes):
+        return last
+    return path
+
+
+def _continue(directory: Path, axes: Axes) -> bool:
+    runs = {name: newest(directory / name) for name in axes}
+    return all(
+        axis.source.live and (not (run := runs[name]).exists() or continues(_summary(run), axis))
+        for name, axis in axes.items()
+    )
+
+
 def _after(directory: Path) -> list[Path]:
     before = {}
     for path in directory.parent.glob("*"):
@@ -41,7 +67,7 @@ def _after(directory: Path) -> list[Path]:
 
 
 def _named(directory: Path, number: int) -> Path:
-    return directory.with_name(f"{directory.name}-{number}")
+    return directory if number == 1 else directory.with_name(f"{directory.name}-{number}")
 
 
 def _number(path: Path, first: Path) -> int:

@@ -48,7 +48,7 @@ def examined_uneven(axis: Axis, log: Log) -> ExaminedRecording:
         found["part"] = {"first": part.first, "stop": part.stop}
     dates = [part.origin_s + sample / part.rate_hz for sample in (part.first, part.stop)]
     date = recorded([RecordedSpan(part.path, part.clock_kind, *dates)])
-    if settings.quantity == "plant" and not settings.average:
+    if settings.quantity == "plant":
         estimate.drift = DriftTest(settings.lines)
     return ExaminedRecording(axis, source, estimate, found, part.clock_kind, lambda _: date, noticed)
 

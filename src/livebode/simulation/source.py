@@ -5,11 +5,12 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from math import ceil
 
 import numpy as np
 
-from livebode.arrays import Floats
+from livebode.arrays import Floats, Integers
 from livebode.core import Block, Channel, UsageError
 from livebode.simulation._axis import Engine
 from livebode.simulation.configuration import BeltAxis, engine_settings
@@ -70,10 +71,15 @@ class SimulatedAxis:
         """
         return delivered((block for block, _ in self.pairs(block_samples)), channels, real_time, clock, sleep)
 
-    def pairs(self, block_samples: int = 4096) -> Iterator[tuple[Block, Truth]]:
-        """Blocks of all channels, each with the truth of its samples."""
+    def pairs(
+        self, block_samples: int = 4096, excitation: Callable[[Integers], Floats] | None = None
+    ) -> Iterator[tuple[Block, Truth]]:
+        """Blocks of all channels, each with the truth of its samples.
+
+        `excitation` gives w at the numbers of the samples of a Block when its turn comes, instead of the axis's period.
+        """
         checked_block_samples(block_samples)
-        return self._pairs(block_samples)
+        return self._pairs(block_samples, excitation or partial(excitation_at, self.axis.excitation_n_m))
 
     def run(self) -> tuple[Block, Truth]:
         """The whole run as one Block, with its truth; UsageError for one without end."""
@@ -86,7 +92,7 @@ class SimulatedAxis:
             )
         return next(self.pairs(max(1, self.samples)))
 
-    def _pairs(self, block_samples: int) -> Iterator[tuple[Block, Truth]]:
+    def _pairs(self, block_samples: int, excitation: Callable[[Integers], Floats]) -> Iterator[tuple[Block, Truth]]:
         axis = self.axis
         position, speed = (row / axis.mechanics.radius_m for row in axis.motion.cycle(self.rate_hz))
         engine = Engine(engine_settings(axis), float(position[0]) * axis.mechanics.radius_m)
@@ -97,7 +103,7 @@ class SimulatedAxis:
             ticks = block_samples if self.samples is None else min(block_samples, self.samples - start)
             number = np.arange(start, start + ticks)
             condition = axis.condition(number / self.rate_hz)
-            w = excitation_at(axis.excitation_n_m, number)
+            w = excitation(number)
             references = [row[number % row.size] for row in (position, speed)]
             torque = self._torque_noise(disturbance, ticks)
             inputs = np.array([*references, w, self._noise(noise, ticks), *_rows(condition), torque])

@@ -16,7 +16,7 @@ from livebode.records import RunRecord
 from livebode.sources import open_log
 from tests.support.command import livebode
 from tests.support.hal_experiments import known_machine, write_experiment
-from tests.support.peers.hal import RATE_HZ, Hal, only_hal, plant
+from tests.support.peers.hal import RATE_HZ, Hal, only_hal, plant, sensitivity
 
 
 @pytest.fixture
@@ -56,3 +56,31 @@ def test_one_command_measures_a_foreign_closed_loop_within_its_bounds(hal: Hal, 
     assert np.all(np.abs(mean.value - truth) < 4 * mean.sigma)
     predicted = np.array(design["sigma_relative"]) * np.abs(truth)
     assert np.all(mean.sigma < 2 * predicted)
+
+
+def test_the_excitation_is_played_in_the_unit_of_the_controller_and_recorded_in_newton_metres(
+    hal: Hal, tmp_path: Path
+) -> None:
+    """The controller's channel is in %, of which one is 2 N m: what it plays is half the numbers of the design."""
+    known_machine(tmp_path)
+    hal.play(np.random.default_rng(1).normal(0, 0.005, 60 * RATE_HZ), 1)
+    file, out = write_experiment(tmp_path, measure="lead_s = 3.0\nsilence_s = 20.0"), tmp_path / "out"
+    text = file.read_text()
+    assert "w [N m]" in text
+    file.write_text(text.replace('"w [N m]"', '"w [%]"').replace("[source]", '[source]\nunits = { w = "2 N m" }'))
+    done = livebode("measure", file, "--out", out)
+    assert done.code == 0, done.err
+    log = open_log(out / "log.csv")
+    assert log.channels[1] == Channel("w", "N m")
+    blocks = [(block["w"], block["u"]) for block in log.blocks(["w", "u"])]
+    w, u = (np.concatenate(parts) for parts in zip(*blocks))
+    assert np.max(np.abs(w)) == pytest.approx(json.loads((out / "design.json").read_text())["peak_n_m"], rel=1e-3)
+    # At the highest line the loop does not respond any more, so that the torque is what the controller played.
+    mean = RunRecord.open(out / "run")
+    source = tomllib.loads((out / "axis.toml").read_text())["source"]
+    first, last = (int(source[key].split()[0]) for key in ("from", "to"))
+    window = mean.lines.window
+    periods = (last - first) // window
+    spectra = [np.fft.rfft(x[first : first + periods * window])[periods * mean.lines.bins[-1]] for x in (w, u)]
+    expected = sensitivity(mean.lines.frequency_hz[-1:])[0] / 2
+    assert spectra[1] / spectra[0] == pytest.approx(expected, rel=0.1)

@@ -55,7 +55,8 @@ MADE = datetime(2026, 11, 21, 12, tzinfo=UTC)
 
 
 def parts(document: Document, kind: type, title: str) -> list:
-    return [p for s in document.sections if s.title == title for p in s.parts if isinstance(p, kind)]
+    sections = (*document.sections, *document.appendix)
+    return [p for s in sections if s.title == title for p in s.parts if isinstance(p, kind)]
 
 
 def artists(axes, gid: str) -> list:
@@ -126,7 +127,7 @@ def test_parameters_over_time_are_those_of_the_table(run: Path) -> None:
     np.testing.assert_array_equal(curves["Keff"][0], [row["value"] for row in rows])
     np.testing.assert_allclose(curves["Keff"][1], 1.959964 * np.array([row["sigma"] for row in rows]))
     (table,) = parts(document, PrintedTable, "Parameters")
-    keff = next(row for row in table.rows if row[0] == "Keff")
+    keff = next(row for row in table.rows if row[0] == "belt stiffness")
     newest = next(row for row in reversed(rows) if row["status"] == "ok")
     assert float(keff[3]) == pytest.approx(newest["value"], rel=1e-3)
     assert float(keff[4]) == pytest.approx(1.96 * newest["sigma"], rel=0.05)
@@ -187,12 +188,15 @@ def test_the_pages_of_a_customer_have_no_command_no_configuration_and_no_path(ru
     for words in ("`", "--", "[fit]", "[report]", "velocity:rate_hz", str(run.parent), "…)"):
         assert squeezed(words) not in text, words
     last = run_report(run, made=MADE, appendix=True).appendix
-    assert [section.title for section in last] == ["Details of the measurement", "Source", "Settings", "Versions",
-                                                   "Not in this report"]  # fmt: skip
+    assert [section.title for section in last] == [
+        "Frequency response", "Data quality", "Details of the measurement", "Source", "Settings", "Versions",
+        "Not in this report",
+    ]  # fmt: skip
 
 
 def _texts(document: Document) -> list[object]:
-    parts = [part.caption if isinstance(part, Picture) else part for s in document.sections for part in s.parts]
+    sections = (*document.sections, *document.appendix)
+    parts = [part.caption if isinstance(part, Picture) else part for s in sections for part in s.parts]
     return [document.facts, document.result, document.verdict, document.foot, *parts]
 
 

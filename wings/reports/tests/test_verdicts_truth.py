@@ -14,11 +14,13 @@ import numpy as np
 import pytest
 
 from livebode.core import Event, date_and_time
-from livebode.fitting import mean_response
+from livebode.fitting import fit, mean_response
 from livebode_reports.compare_report import Comparison
 from livebode_reports.difference import Difference
 from livebode_reports.html import to_html
-from livebode_reports.run_report import run_report
+from livebode_reports.parameter_track import Track
+from livebode_reports.report_data import read
+from livebode_reports.run_report import report_of, run_report
 from tests.support.reports import measured, write_run
 
 MADE = datetime(2026, 11, 21, 12, tzinfo=UTC)
@@ -56,14 +58,39 @@ def test_a_run_without_a_baseline_is_not_assessed(tmp_path: Path) -> None:
     assert document.tones[changes.tone] == "not assessed"
 
 
-@pytest.mark.parametrize(("rows", "gaps", "tone"), [((0,), 0, "ok"), ((0, 7), 0, "check"), ((0, 7), 1, "ok")], ids=str)
-def test_invalid_windows_of_a_start_and_a_gap_are_expected(tmp_path: Path, rows: Any, gaps: int, tone: str) -> None:
-    """Windows overlap by half, so that each start makes one of ten responses invalid."""
+@pytest.mark.parametrize(("rows", "gaps", "found"), [((0,), 0, 0), ((0, 7), 0, 1), ((0, 7), 1, 0)], ids=str)
+def test_invalid_windows_of_a_start_and_a_gap_are_no_finding(tmp_path: Path, rows: Any, gaps: int, found: int) -> None:
+    """Windows overlap by half, so that each start makes one of ten responses invalid; the appendix counts them."""
     responses = measured(10, 1)
     responses.valid[list(rows)] = False
     document = run_report(write_run(tmp_path / "run", responses, counts={"gaps": gaps}), made=MADE)
-    (found,) = [f for f in document.verdict if "have an invalid line" in f.text]
-    assert found.tone == tone
+    findings = [f for f in document.verdict if "an invalid line" in f.text]
+    assert [(f.tone, f.subject) for f in findings] == [("check", "measurement")] * found
+    (quality,) = [section for section in document.appendix if section.title == "Data quality"]
+    assert f"{len(rows)} ({10 * len(rows)} %)" in str(quality.parts)
+
+
+@pytest.mark.parametrize(
+    ("rejected", "finding"),
+    [
+        ({"no response": 19, "not seen": 8}, None),  # windows at the start, of which nothing can be fitted yet
+        ({"no response": 19, "not seen": 40}, "Of 361 fits over the run, 40 were rejected: 40 not seen."),
+    ],
+    ids=str,
+)
+def test_what_the_software_left_out_is_in_the_appendix_and_no_verdict(
+    tmp_path: Path, rejected: dict[str, int], finding: str | None
+) -> None:
+    run = read(write_run(tmp_path / "run", measured(30, 1)))
+    track = Track(run.of.overview.time_s, model="two-mass")
+    track.statuses.update({"ok": 380 - sum(rejected.values())} | rejected)
+    document = report_of(replace(run, fit=fit(run.of.response, "two-mass"), tracks={"two-mass": track}), made=MADE)
+    assert [f.text for f in document.verdict if "fits over the run" in f.text] == [finding] * (finding is not None)
+    verdict, *below = document.result
+    assert (verdict.tone, "not judged" in verdict.text) == ("open", True)
+    assert finding is None or finding in [f.text for f in below]
+    (quality,) = [section for section in document.appendix if section.title == "Data quality"]
+    assert f"380 (rejected: 19 no response, {rejected['not seen']} not seen)" in str(quality.parts)
 
 
 def test_a_comparison_is_headed_by_the_alarm_of_a_run_though_no_line_differs(tmp_path: Path) -> None:

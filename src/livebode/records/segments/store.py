@@ -195,7 +195,7 @@ class Store:
                 raise error
             self.commit(self.last.sample, self.last.time_s, states)  # with the events of closing
             self._not_paused()
-            self._write_summary(summary, finished=finished)
+            self._write_summary(summary, finished=finished, ended=True)
             if finished:
                 self._shelf.discard(journal.name_of(self._number))
         _logger.info("%s: the record ends, %s", self.path, "finished" if finished else "to be continued")
@@ -270,8 +270,8 @@ class Store:
         if self._events.length and not ends_line(self.path):
             self._events.append(b"\n")  # so that only the damaged line is lost
 
-    def _write_summary(self, summary: dict[str, Any], *, finished: bool) -> None:
-        record: dict[str, Any] = {"finished": finished, "tables": list(self._tables)}
+    def _write_summary(self, summary: dict[str, Any], *, finished: bool, ended: bool = False) -> None:
+        record: dict[str, Any] = {"finished": finished, "ended": ended, "tables": list(self._tables)}
         if retained := self._shelf.retained:
             places = [place for damaged_journal in retained for place in damaged_journal.damages]
             record["damaged"] = {

@@ -12,6 +12,8 @@ from livebode.sources.live.batch import LiveBlock as LiveBlock
 from livebode.sources.live.computer_clock import ClockReading as ClockReading
 from livebode.sources.live.connection import pieces as pieces
 from livebode.sources.live.datagrams import receiver as receiver
+from livebode.sources.live.fields import FieldDecoder as FieldDecoder
+from livebode.sources.live.fields import message_decoder as message_decoder
 from livebode.sources.live.frame import FrameDecoder as FrameDecoder
 from livebode.sources.live.frame import encode_layout as encode_layout
 from livebode.sources.live.frame import encode_samples as encode_samples
@@ -23,7 +25,16 @@ from livebode.sources.live.framing import FrameSplitter as FrameSplitter
 from livebode.sources.live.framing import damaged_frame as damaged_frame
 from livebode.sources.live.framing import read_header as read_header
 from livebode.sources.live.health import Health as Health
+from livebode.sources.live.heard import HeardChannel as HeardChannel
+from livebode.sources.live.heard import HeardSamples as HeardSamples
+from livebode.sources.live.heard import Survey as Survey
+from livebode.sources.live.heard import nice_rate as nice_rate
+from livebode.sources.live.heard import survey as survey
+from livebode.sources.live.heard import survey_messages as survey_messages
+from livebode.sources.live.heard import survey_of as survey_of
+from livebode.sources.live.heard import unusable_words as unusable_words
 from livebode.sources.live.joined import join_blocks as join_blocks
+from livebode.sources.live.kinds import MESSAGES as MESSAGES
 from livebode.sources.live.kinds import SourceKind as SourceKind
 from livebode.sources.live.lines import LineSplitter as LineSplitter
 from livebode.sources.live.ndjson import LINE_BYTES_MAX as LINE_BYTES_MAX

@@ -25,6 +25,9 @@ class SourceKind:
         the example has one.
     has_path
         Whether scheme://host:port/path is meant.
+    survey
+        "module:name" of the function that lists what an address offers, as `livebode inspect` shows it; empty: its
+        samples, or the fields of messages.
     player
         "module:name" of the `Player` that plays an excitation on its controller; empty if none can.
     """
@@ -35,10 +38,13 @@ class SourceKind:
     port: int | None = None
     device: str = ""
     has_path: bool = False
+    survey: str = ""
     player: str = ""
 
 
-_FRAMES = {"rate_hz", "reorder_batches"}
+MESSAGES = {"rate_hz", "fields", "sample_field"}
+"""Keys of a kind whose messages may be those of another program."""
+_FRAMES = MESSAGES | {"reorder_batches"}
 
 
 def _kind(source: str, keys: set[str], port: int | None = None, device: str = "", has_path: bool = False) -> SourceKind:
@@ -48,5 +54,5 @@ def _kind(source: str, keys: set[str], port: int | None = None, device: str = ""
 SOURCES: Mapping[str, SourceKind] = {
     "udp": _kind("udp:UdpSource", _FRAMES | {"sender"}),
     "tcp": _kind("tcp:TcpSource", _FRAMES),
-    "stdin": _kind("lines:StdinSource", {"rate_hz"}, device="stdin:"),
+    "stdin": _kind("lines:StdinSource", MESSAGES, device="stdin:"),
 }

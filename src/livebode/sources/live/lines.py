@@ -8,6 +8,7 @@ import sys
 from typing import ClassVar
 
 from livebode.core import LivebodeError
+from livebode.sources.live.fields import FieldDecoder, message_decoder
 from livebode.sources.live.ndjson import LINE_BYTES_MAX, LineDecoder
 from livebode.sources.live.reach import Reach
 from livebode.sources.live.source import TICK_S, LiveSource
@@ -26,7 +27,7 @@ class StdinSource(LiveSource):
         return Reach("not applicable", "samples come from standard input")
 
     def _receive(self) -> bool:
-        decoder, splitter = LineDecoder(self.settings.rate_hz), LineSplitter()
+        decoder, splitter = message_decoder(self.settings), LineSplitter()
         number = sys.stdin.fileno()
         self._established()
         while not self._stop.is_set():
@@ -42,11 +43,11 @@ class StdinSource(LiveSource):
                 return True
         return False
 
-    def _decode(self, decoder: LineDecoder, line: bytes) -> None:
+    def _decode(self, decoder: LineDecoder | FieldDecoder, line: bytes) -> None:
         try:
             batch = decoder.decode(line)
         except LivebodeError as error:
-            self._malformed(error)
+            self._malformed(error, line)
             return
         self._deliver(batch)
 

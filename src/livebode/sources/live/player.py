@@ -24,8 +24,8 @@ class MeasureSection(BaseModel):
     Parameters
     ----------
     limits
-        Limits of channels, in their units: `u = 14.5` for a magnitude, `x = [0.2, 1.8]` for a range. Default:
-        that of the input is `limits.torque_n_m_max`.
+        Limits of channels, in SI units where theirs are recognised: `u = 14.5` for a magnitude, `x = [0.2, 1.8]` for a
+        range. Default: that of the input is `limits.torque_n_m_max`.
     ramp_down_s
         Duration of the ramp to zero, in seconds.
     lead_s
@@ -81,7 +81,7 @@ class Player(ABC):
 
     @abstractmethod
     def start(self, waveform: Waveform) -> None:
-        """Ramp up, then repeat the period."""
+        """Ramp up, then repeat the period, whose samples are in the unit of the controller's channel."""
 
     @abstractmethod
     def keep(self, played: int) -> None:

@@ -159,6 +159,12 @@ class SourceKeys(DeferredModel):
         Number of batches by which a batch may be late (UDP, MQTT).
     sender
         The only permitted IP address of the sender (UDP). Default: any.
+    fields
+        Field of each channel in JSON that another program sends (UDP, TCP, MQTT, standard input), as a path:
+        { "u [N m]" = "drive.torque", "y [rad/s]" = "axes[0].vel" }. "samples[*].u" is each element of a list. Needs
+        rate_hz. Default: the sender writes frames or lines for livebode.
+    sample_field
+        Field that numbers the samples of such messages, so that losses are exact. Default: messages are counted.
     kinds
         Kind of quantity of channels whose unit does not show it, or shows another: { speed = "velocity" }. Default: by
         the unit, otherwise by the name.
@@ -184,6 +190,8 @@ class SourceKeys(DeferredModel):
     timeout_s: Annotated[float, Field(gt=0, le=1e6)] = 30.0
     reorder_batches: Annotated[int, Field(ge=0, le=256)] = 8
     sender: str | None = None
+    fields: dict[str, str] = {}
+    sample_field: str | None = None
     kinds: dict[str, QuantityKind] = {}
     units: Annotated[dict[str, str], AfterValidator(_checked_units)] = {}
 

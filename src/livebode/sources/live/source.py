@@ -39,6 +39,8 @@ TICK_S = 0.1
 """Longest time until a request to end is detected."""
 UNDECIDED_S_MAX = 2.0
 """Batches that are in doubt for so long while nothing arrives are acknowledged: the sender may not send more before."""
+UNUSABLE_MAX = 16
+"""Messages that cannot be used and are retained, so that a person can see what is wrong with them."""
 TOGETHER_S = 0.25
 """Longest machine time that is taken from the queue at once: what waits is cheaper together than batch by batch."""
 
@@ -62,6 +64,8 @@ class LiveSource(ABC):
         Whether the sender sends no more until more of what it sent is recorded.
     backlog_cause
         Why samples wait; its reader reports when it waits for its record.
+    retains_unusable
+        Whether messages that cannot be used are not reported, but what its reader wants to see.
     """
 
     format: ClassVar[str]
@@ -112,6 +116,9 @@ class LiveSource(ABC):
         self._settled, self._taken_delivery = SettledDeliveries(), 0
         self.has_record = self.asks_commit = False
         self.backlog_cause = BacklogCause()
+        self.retains_unusable = False
+        self.unusable: deque[tuple[float, bytes]] = deque(maxlen=UNUSABLE_MAX)
+        """When each of the newest messages that cannot be used came, by `time.monotonic`, and its bytes."""
 
     @abstractmethod
     def _receive(self) -> bool:
@@ -431,9 +438,14 @@ class LiveSource(ABC):
             )
         self._connected, self._outage, self._trouble = False, True, why
 
-    def _malformed(self, why: object) -> None:
-        self._events.report("malformed", Message("{address}: {why}", address=self.address, why=why))
+    def _malformed(self, why: object, received: bytes = b"") -> None:
+        """What was received cannot be used."""
+        if received:
+            self.unusable.append((time.monotonic(), received))
         self._trouble = why
+        if self.retains_unusable:
+            return
+        self._events.report("malformed", Message("{address}: {why}", address=self.address, why=why))
 
     def _deliver(self, batch: AnyBatch, *, waits: bool | None = None) -> None:
         """Add a batch to the queue; `waits`: whether its sender can wait, where it is not the same for all batches."""

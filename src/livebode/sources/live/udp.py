@@ -11,6 +11,7 @@ from livebode.core import ConfigError, LivebodeError
 from livebode.language import Message
 from livebode.sources.live.address import Address
 from livebode.sources.live.datagrams import receiver
+from livebode.sources.live.fields import FieldDecoder, message_decoder
 from livebode.sources.live.frame import FrameDecoder
 from livebode.sources.live.reach import Reach
 from livebode.sources.live.settings import SourceSettings
@@ -30,7 +31,7 @@ class UdpSource(LiveSource):
 
     def __init__(self, settings: SourceSettings, address: Address) -> None:
         super().__init__(settings, address)
-        self._decoder = FrameDecoder()
+        self._decoder = _decoder(settings)
         try:
             self._sender = None if settings.sender is None else plain_address(settings.sender)
         except ValueError:
@@ -60,7 +61,7 @@ class UdpSource(LiveSource):
             port.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, BUFFER_BYTES)
             port.bind((self.address.host, self.address.port))
             self._established()
-            self._decoder = FrameDecoder()
+            self._decoder = _decoder(self.settings)
             with receiver().receiving(port, self._take_datagram) as check:
                 while not self._stop.wait(_CHECK_S):
                     check()
@@ -78,10 +79,15 @@ class UdpSource(LiveSource):
         try:
             batch = self._decoder.decode(datagram, time.monotonic())
         except LivebodeError as error:
-            self._malformed(error)
+            self._malformed(error, datagram)
             return
         if batch is not None:
             self._deliver(batch)
+
+
+def _decoder(settings: SourceSettings) -> FrameDecoder | FieldDecoder:
+    decoder = message_decoder(settings)
+    return decoder if isinstance(decoder, FieldDecoder) else FrameDecoder()
 
 
 def plain_address(host: str) -> IPv4Address | IPv6Address:

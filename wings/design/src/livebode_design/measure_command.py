@@ -29,6 +29,9 @@ def measure_command(
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Print what would be played and check the controller; play nothing.")
     ] = False,
+    simulated: Annotated[
+        bool, typer.Option("--simulated", help="Play on a simulation of the \\[belt] axis in place of \\[source].")
+    ] = False,
     as_json: Json = False,
 ) -> None:
     """Design an excitation, play it on the controller, record, and track the response; Ctrl-C ramps it down.
@@ -43,7 +46,7 @@ def measure_command(
 
     asked = Experiment.read(experiment)
     with working():
-        prepared = prepare(asked)
+        prepared = prepare(asked, simulated=simulated)
     if not as_json:
         show_design(prepared.design)
         print()

@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from livebode.analysis import mean_of
 from livebode.configuration import LoopSection, recorded_configuration
-from livebode.core import ConfigError, read_unit, split_plant_unit
+from livebode.core import ConfigError, split_plant_unit
 from livebode.records import RunRecord
 from livebode_design.machine import MOTION_KEYS, Machine
 from livebode_design.measured_plant import MeasuredResponse, Output, measured_machine
@@ -166,5 +166,5 @@ class MeasuredAxis:
 
 
 def _in_n_m_and_rad(unit: str) -> bool:
-    output, input = map(read_unit, split_plant_unit(unit))
-    return output in (read_unit("rad/s"), read_unit("rad")) and input == read_unit("N m")
+    output, input = split_plant_unit(unit)
+    return output in ("rad/s", "rad") and input == "N m"

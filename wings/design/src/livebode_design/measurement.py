@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf
 from pathlib import Path
 from typing import Any
@@ -97,13 +97,15 @@ class Made:
     lost: int
 
 
-def prepare(experiment: Experiment) -> ReadyMeasurement:
+def prepare(experiment: Experiment, *, simulated: bool = False) -> ReadyMeasurement:
     """Design the experiment and check the controller; nothing is played or written.
+
+    With `simulated` the controller is a simulation of the experiment's [belt].
 
     Raises
     ------
     ConfigError
-        If the experiment has no [source], or a signal is not one of its channels.
+        If the experiment has no [source], or to be simulated no [belt], or a signal is not one of its channels.
     MeasurementError
         If the controller cannot play the excitation so that it ends by itself.
     DesignError
@@ -111,21 +113,41 @@ def prepare(experiment: Experiment) -> ReadyMeasurement:
     SourceError
         If the controller is not connected as configured.
     """
-    if experiment.source is None:
-        raise ConfigError(
-            "key-missing",
-            "the experiment has no [source]: the controller that plays and records",
-            "add it; wings/design/docs/measure.md has an example",
-            key="source",
-        )
+    player = _simulated(experiment) if simulated else _controller(experiment)
     signals, limits = experiment.signal_names(), experiment.machine_limits()
-    player = make_player(experiment.source, experiment.measure, signals["excitation"])
     design = experiment.design()
     ranges = experiment.measure.ranges()
     if "input" in signals and limits.torque_n_m_max < inf:
         ranges.setdefault(signals["input"], (-limits.torque_n_m_max, limits.torque_n_m_max))
     connection = player.check(design.waveform)
     return ReadyMeasurement(design, player, connection, signals["excitation"], ranges, experiment.measure)
+
+
+def _simulated(experiment: Experiment) -> Player:
+    """A simulation of the experiment's axis."""
+    from livebode_design.simulated import SimulatedPlayer  # with the simulation
+
+    axis = experiment.axis()
+    if axis is None:
+        raise ConfigError(
+            "key-missing",
+            "the experiment has no [belt], whose constants are those of the simulated machine",
+            "describe the axis by [belt] in place of [measured], as in `livebode example experiment`",
+            key="belt",
+        )
+    return SimulatedPlayer(replace(axis, seconds=inf), experiment.measure)
+
+
+def _controller(experiment: Experiment) -> Player:
+    """The player of the controller in [source]."""
+    if experiment.source is None:
+        raise ConfigError(
+            "key-missing",
+            "the experiment has no [source]: the controller that plays and records",
+            "add it; wings/design/docs/measure.md has an example; --simulated tries it without a machine",
+            key="source",
+        )
+    return make_player(experiment.source, experiment.measure, experiment.signal_names()["excitation"])
 
 
 def make_player(settings: SourceSettings, section: MeasureSection, excitation: str) -> Player:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum, auto
 from pathlib import Path
 from typing import Self
@@ -104,7 +104,7 @@ class Playback:
         self._interrupted = False
         self._asked_s = 0.0
         self._zeros = 0
-        self._started_s = 0.0
+        self._started_s, self._unit = 0.0, 1.0
 
     def run(self, path: Path, request: StopRequest) -> PlaybackResult:
         """Record to `path`, a new CSV file; returns when the excitation has ended.
@@ -119,6 +119,7 @@ class Playback:
         """
         with self._player.source.open() as source, LogTable(path) as table:
             watch = LimitWatch(self._ranges, [channel.name for channel in source.channels])
+            self._unit = {channel.name: channel.factor for channel in source.channels}.get(self._excitation, 1.0)
             try:
                 self._loop(watch, table, request)
             finally:
@@ -177,7 +178,8 @@ class Playback:
         if self._phase is _Phase.REST and self._rested >= REST_S * lines.rate_hz:
             self._say(f"ramping up over {self._design.ramp_s:.3g} s, then playing {self._design.recording_s:.4g} s")
             self._phase, self._started_s = _Phase.PLAYING, time.monotonic()
-            self._player.start(self._design.waveform)
+            waveform = self._design.waveform  # in N m; the controller takes the unit of its channel
+            self._player.start(replace(waveform, samples=waveform.samples / self._unit))
         elif self._phase is _Phase.PLAYING:
             self._player.keep(self._since_start)
             if self._first is None and time.monotonic() - self._started_s > self._player.stop_s + LATE_S:

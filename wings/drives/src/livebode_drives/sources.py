@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from livebode.sources.live import SourceKind
+from livebode.sources.live import MESSAGES, SourceKind
 
 _TLS = {"certificate_file", "key_file"}
 _LOGIN = {"username", "password_env", "password_file"}
-_MQTT = {"rate_hz", "reorder_batches", "client_id"} | _LOGIN
+_MQTT = MESSAGES | {"reorder_batches", "client_id"} | _LOGIN
 _OPCUA = {"rate_hz", "nodes", "sample_node", "security", "server_certificate_file"} | _LOGIN | _TLS
 _ADS = {"rate_hz", "symbol", "channels", "mode", "net_id", "ams_port", "local_net_id", "poll_s"}
 _SERIAL = {"rate_hz", "channels", "counter", "counter_modulus", "baud_rate"}
@@ -23,9 +23,17 @@ def _kind(source: str, keys: set[str], **given: Any) -> SourceKind:
 
 
 SOURCES: Mapping[str, SourceKind] = {
-    "mqtt": _kind("mqtt:MqttSource", _MQTT, port=1883, has_path=True),
-    "mqtts": _kind("mqtt:MqttSource", _MQTT | _TLS | {"ca_file"}, port=8883, has_path=True),
-    "opc.tcp": _kind("opcua:OpcUaSource", _OPCUA, port=4840, has_path=True),
+    "mqtt": _kind("mqtt:MqttSource", _MQTT, port=1883, has_path=True, survey="livebode_drives.live.mqtt_survey:survey"),
+    "mqtts": _kind(
+        "mqtt:MqttSource",
+        _MQTT | _TLS | {"ca_file"},
+        port=8883,
+        has_path=True,
+        survey="livebode_drives.live.mqtt_survey:survey",
+    ),
+    "opc.tcp": _kind(
+        "opcua:OpcUaSource", _OPCUA, port=4840, has_path=True, survey="livebode_drives.live.opcua_survey:survey"
+    ),
     "ads": _kind("ads:AdsSource", _ADS, port=48898, player="livebode_drives.players.ads:AdsPlayer"),
     "hal": _kind(
         "hal:HalSource",

@@ -178,7 +178,7 @@ def test_a_jump_is_a_doubt_unless_its_runs_are_left_out(tmp_path: Path) -> None:
     jumped, steady = healthy_runs(lake, Selection())
     assert not steady.doubts
     (doubt,) = jumped.doubts
-    assert "Keff of A/L1/M1/x fell by" in doubt
+    assert "belt stiffness of A/L1/M1/x fell by" in doubt
     with pytest.raises(ArchiveError, match="fell by"):
         jumped.check()
     half_s = START_S + 0.5 * 365.25 * 86400

@@ -42,7 +42,7 @@ def test_the_machines_with_a_fault_are_marked_and_ranked_with_the_true_amounts(h
 def test_the_table_names_what_was_found_and_what_was_not_assessed(hall: Path) -> None:
     shown = livebode("archive", "trend", hall, "keff").out
     lines = shown.splitlines()
-    assert lines[0] == "Keff (two-mass): 7 machines, 1069 runs"
+    assert lines[0] == "belt stiffness (two-mass model): 7 machines, 1069 runs"
     assert lines[2].startswith("A/L1/M3 *")
     assert "−5.89 ± 0.17 % on 2025-06-16" in shown
     assert "A/L2/M2: 2 axes together; --by axis shows each" in lines
@@ -127,7 +127,10 @@ def test_an_option_of_the_other_use_is_refused(hall: Path, words: list[str], say
 @pytest.mark.parametrize(
     ("language", "words"),
     [
-        ("en", ["3 of 7 axes changed significantly.", "Keff of A/L1/M2/x fell by 5.89 ± 0.17 % on 2025-06-16."]),
+        (
+            "en",
+            ["3 of 7 axes changed significantly.", "belt stiffness of A/L1/M2/x fell by 5.89 ± 0.17 % on 2025-06-16."],
+        ),
         ("de", ["3 von 7 Achsen haben sich signifikant geändert.", "sank am 2025-06-16 um 5,89 ± 0,17 %"]),
         ("zh-CN", ["7 个轴中有 3 个发生显著变化。"]),
     ],

@@ -48,8 +48,9 @@ _TRACKED: list[dict[str, Any]] = [
     {"signals": _SIGNALS | {"schedule": "x"}},
     {"signals": _SIGNALS | {"schedule": "x"}},
     {"fit": {"model": "rigid"}},
+    {"source": _SOURCE | {"units": {"u": "0.5 N m"}}},
 ]
-"""Axes 0 and 1, and 4 and 5, are alike; 2 and 3 but for a kind; the last one is fitted."""
+"""Axes 0 and 1, and 4 and 5, are alike; 2 and 3 but for a kind; 6 is fitted, and 7 has the unit of its drive."""
 AXES = len(_TRACKED)
 
 
@@ -61,7 +62,7 @@ def _axis(number: int) -> Axis:
 
 
 def _message(axis: int, number: int, kind: str = "whole") -> bytes:
-    hop = (25, 25, 100, 100, 200, 200, 100)[axis]
+    hop = (25, 25, 100, 100, 200, 200, 100, 25)[axis]
     layout = SpectraLayout(CHANNELS, POSITION if axis in (4, 5) else (), window=WINDOW, hop=hop, lines=LINES)
     rng = np.random.default_rng([axis, number])
     frequency = np.asarray(LINES) * RATE_HZ / WINDOW
@@ -172,6 +173,20 @@ def _next(numbers: list[int], streams: list[AxisStream], n: int = 12, kinds: dic
         stream.add(_message(number, n, (kinds or {}).get(number, "whole")), n + 1, 1e9 + 0.05 * n)
 
 
+def test_spectra_in_the_unit_of_a_drive_are_those_in_si_units_also_when_axes_are_tracked_together() -> None:
+    streams = [AxisStream(_axis(number), 1) for number in (0, 7)]
+    found: list[list[Responses]] = [[], []]
+    for n in range(COUNT):
+        for stream in streams:
+            stream.add(_message(0, n), n + 1, 1e9 + 0.05 * n)
+        for i, output in enumerate(outputs_together(streams)):
+            found[i] += [] if output.responses is None else [output.responses]
+    plain, scaled = map(Responses.join, found)
+    assert len(plain) == len(scaled) > COUNT // 2
+    np.testing.assert_allclose(scaled.value, plain.value / 0.5, rtol=1e-12)
+    np.testing.assert_allclose(scaled.coherence, plain.coherence, rtol=1e-9)
+
+
 def test_axes_that_are_alike_are_one_stack_and_their_rows_are_stored_as_those_of_one_axis() -> None:
     numbers = [0, 1, 2, 4, 5, 6]
     streams, alone = _streams(numbers), _streams(numbers, _AloneStream)
@@ -218,8 +233,10 @@ def test_an_axis_whose_tracking_raises_fails_alone(monkeypatch: pytest.MonkeyPat
 
 
 def test_trackers_of_other_settings_are_of_another_kind() -> None:
-    kinds = [stream.usual.kind[0] for stream in _streams(list(range(AXES))) if stream.usual is not None]
-    assert len(kinds) == AXES
+    kinds = [
+        stream.usual.kind[0] for stream in _streams(list(range(AXES))) if stream.usual is not None
+    ]  # not of 7, whose messages are read
+    assert len(kinds) == AXES - 1
     assert len(set(kinds)) == 5
     assert kinds[0] is kinds[1]
 

@@ -34,7 +34,7 @@ def verdict(differences: RunDifferences, changes: Changes) -> tuple[Finding, ...
 def _alarms(differences: RunDifferences) -> Iterator[Finding]:
     """Alarms of both runs; none for a finished run without a baseline."""
     for run, when in zip(differences.runs, (tr("Before"), tr("After"))):
-        if run.summary.get("monitoring", {}).get("baseline") is not None or not run.finished:
+        if run.summary.get("monitoring", {}).get("baseline") is not None or not run.ended:
             for finding in alarms(run, EventSummary.of(run.each_event_and_damage())):
                 if finding.tone != "ok":
                     yield Finding(finding.tone, f"{when}: {finding.text}")

@@ -102,7 +102,7 @@ _ACTIVE_MAX = 5
 def alarms(run: RunRecord, event_summary: EventSummary) -> tuple[Finding, ...]:
     """The summary of the monitoring, then the active alarms."""
     monitoring: dict[str, Any] = run.summary.get("monitoring", {})
-    if "message" not in monitoring or (run.finished and monitoring.get("baseline") is None):
+    if "message" not in monitoring or (run.ended and monitoring.get("baseline") is None):
         return (_so_far(run, event_summary),)
     active = bool(monitoring.get("standing"))
     tone = result_tone(monitoring, active=active)
@@ -127,7 +127,7 @@ def _newest(event_summary: EventSummary) -> list[Event]:
 
 def _so_far(run: RunRecord, event_summary: EventSummary) -> Finding:
     """The changes so far, if run.json does not contain a summary yet."""
-    if run.finished:
+    if run.ended:
         return Finding(
             "open", tr("Changes are not assessed: the run was not compared with a baseline of the healthy machine.")
         )

@@ -53,11 +53,13 @@ def result(
 ) -> tuple[Finding, ...]:
     """The verdict of the report, and the next findings that a person should see.
 
-    `not_judged` replaces a verdict where only the quality of the measurement is known.
+    A verdict is about the machine; what is doubtful of the measurement is below it. `not_judged` replaces the verdict
+    where nothing was specified by which the machine could be judged.
     """
     every = [*about_limits(accepted), *findings]
-    first = min(every, key=lambda finding: _URGENT.index(finding.tone))
-    if first.tone == "ok" and not_judged:
+    about_machine = [finding for finding in every if finding.subject == "machine"]
+    first = min(about_machine, key=lambda finding: _URGENT.index(finding.tone), default=Finding("open", not_judged))
+    if first.tone in ("ok", "open") and not_judged:
         first = Finding("open", not_judged)
     urgent = [f for f in every if f.tone not in ("ok", "open") and f is not first]
     return (first, *sorted(urgent, key=lambda finding: _URGENT.index(finding.tone))[:_MORE])

@@ -5,7 +5,7 @@ from __future__ import annotations
 from base64 import b64encode
 from html import escape
 
-from livebode.core import Document, Finding, Listing, Paragraph, Part, Picture, PrintedTable, Section
+from livebode.core import Answer, Document, Finding, Listing, Paragraph, Part, Picture, PrintedTable, Section
 from livebode.language import current_language, worded
 from livebode_reports.page_style import STYLE_SHEET
 from livebode_reports.svg import pictures_svg, themed_svg
@@ -54,7 +54,7 @@ class _Page:
         signatures = "".join(f"<p>{_text(s)}</p>" for s in of.signatures)
         return (
             f'<header>\n{self._logo()}<p class="kind">{_text(of.kind)}</p>\n<h1>{_text(of.title)}</h1>\n'
-            f'<dl class="facts">{facts}</dl>\n{self._result()}'
+            f'<dl class="facts">{facts}</dl>\n{self._answers()}{self._result()}'
             + (self._picture(of.picture) if of.picture is not None else "")
             + (f'\n<div class="signatures">{signatures}</div>' if signatures else "")
             + "\n</header>"
@@ -67,10 +67,26 @@ class _Page:
         kind, data = {"png": "png", "svg": "svg+xml"}[logo.kind], b64encode(logo.data).decode()
         return f'<img class="logo" alt="{_text(logo.text)}" src="data:image/{kind};base64,{data}">\n'
 
+    def _answers(self) -> str:
+        of = self._of
+        rows = "\n".join(
+            f'<tr><th scope="row">{_text(a.name)}</th><td class="value">{_text(a.value)}</td>'
+            f"<td>{_text(a.limit)}</td><td{self._tone(a)}</td></tr>"
+            for a in of.answers
+        )
+        note = f'<p class="note">{_text(of.about_answers)}</p>\n' if of.about_answers else ""
+        return f'<table class="answers"><tbody>\n{rows}\n</tbody></table>\n{note}' if of.answers else ""
+
+    def _tone(self, answer: Answer) -> str:
+        tone = answer.tone
+        return ">" if tone is None else f' class="tone {tone}">{_text(worded(self._of.tones[tone]))}'
+
     def _result(self) -> str:
         if not self._of.result:
             return ""
         first, *more = self._of.result
+        if first.tone == "open" and self._of.answers:  # there is no verdict: the answers are the largest text
+            return self._findings(self._of.result)
         word = f'<p class="word {first.tone}">{_text(worded(self._of.tones[first.tone]))}</p>'
         further = self._findings(tuple(more)) if more else ""
         return f'<div class="result {first.tone}">{word}<p class="why">{_text(first.text)}</p></div>\n{further}'

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from math import ceil, isfinite, isinf
 
 from livebode.configuration import MAGNITUDES, LimitSection
-from livebode.core import TONES, Finding, Paragraph, PrintedTable, Section, with_bound
+from livebode.core import TONES, Answer, Finding, Paragraph, PrintedTable, Section, with_bound
 from livebode.language import Message, number, tr, trn, worded
 from livebode_reports.acceptance import LimitResult
 
@@ -61,6 +61,13 @@ def limits(accepted: Sequence[LimitResult]) -> Section | None:
         "together with 95 %, and the value that is nearest to the limit is shown."
     )
     return Section(tr("Limits"), (PrintedTable(headings, rows, (2, 3)), Paragraph(rule)))
+
+
+def answer_of(a: LimitResult) -> Answer:
+    """The measured value beside its limit, for the first page."""
+    value, bound, unit = _value(a)
+    text = " ".join(filter(None, (f"{value} ± {bound}" if bound else value, unit)))
+    return Answer(_name(a.limit), worded(a.reason) if a.reason else text, _range(a.limit), a.result)
 
 
 def _name(limit: LimitSection) -> str:

@@ -35,7 +35,7 @@ from livebode_reports.events import EventSummary
 from livebode_reports.measurement_words import about_bounds, grid_rows, matrix_in_words, signal_rows
 from livebode_reports.report_data import Extent, RunData
 from livebode_reports.run_report import facts, not_judged, record_appendix
-from livebode_reports.verdict import about_record, by_urgency
+from livebode_reports.verdict import about_record, by_urgency, of_measurement
 from livebode_reports.wording import line_table, lines_of, pairs, polar, share
 
 
@@ -254,7 +254,7 @@ def matrix_report(
         If the logo cannot be used.
     """
     of = read_matrix(directory, header)
-    findings = by_urgency([*about_record(of), *about_columns(of.newest), about_responses(of)])
+    findings = by_urgency([*about_record(of), *of_measurement(about_columns(of.newest), [about_responses(of)])])
     title = of.header.machine or of.title
     parts: list[Section] = [
         how(of), bode(of), entries(of), inputs(of),

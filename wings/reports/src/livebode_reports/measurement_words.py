@@ -139,7 +139,10 @@ def details(of: RunData) -> Section:
 def _options(tracking: dict[str, Any], of: ReportData) -> list[str]:
     parts = []
     if tracking.get("average"):
-        parts.append(tr("averaged over periods with forgetting {forgetting:g}", forgetting=tracking["forgetting"]))
+        forgetting = of.run.found["forgetting"]
+        all_periods = tr("averaged over all periods")
+        some = tr("averaged over periods with forgetting {forgetting:g}", forgetting=forgetting)
+        parts.append(all_periods if forgetting == 1 else some)
     if tracking.get("differenced"):
         parts.append(tr("differenced: {channels}", channels=listed(tracking["differenced"])))
     if tracking.get("spikes"):

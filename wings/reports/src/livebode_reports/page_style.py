@@ -36,14 +36,21 @@ body { margin: 0 auto; padding: 1.5rem 1.2rem 3rem; max-width: 62rem; color: var
 header p.kind { margin: 0; color: var(--c5b6775); font-weight: 600; }
 h1 { margin: 0 0 .8rem; font-size: 1.9rem; line-height: 1.2; overflow-wrap: anywhere; }
 h2 { margin: 2.4rem 0 .7rem; padding-top: .5rem; border-top: 2px solid var(--ce3e7ec); font-size: 1.25rem; }
-dl.facts { display: grid; grid-template-columns: repeat(auto-fill, minmax(15rem, 1fr)); gap: .5rem 1.5rem; margin: 0; }
+dl.facts { display: grid; grid-template-columns: repeat(auto-fill, minmax(min(15rem, 45%), 1fr)); gap: .5rem 1.5rem;
+  margin: 0; }
 dl.facts div { min-width: 0; }
 dt { color: var(--c5b6775); font-size: .82rem; }
 dd { margin: 0; overflow-wrap: anywhere; }
 ul.verdict { margin: .4rem 0 0; padding: 0; list-style: none; }
-ul.verdict li { display: grid; grid-template-columns: 7.2rem 1fr; gap: .8rem; padding: .45rem 0;
+ul.verdict li { display: grid; grid-template-columns: 8.2rem 1fr; gap: .8rem; padding: .45rem 0;
   border-bottom: 1px solid var(--ce3e7ec); overflow-wrap: anywhere; }
 .tone { font-weight: 700; }
+table.answers { margin: 1.4rem 0 0; width: auto; min-width: min(100%, 34rem); }
+table.answers th, table.answers td { padding: .3rem 1.4rem .3rem 0; border-bottom: 1px solid var(--ce3e7ec);
+  vertical-align: baseline; }
+table.answers th { font-weight: 400; color: var(--c5b6775); font-size: 1rem; }
+table.answers td.value { font-size: 1.35rem; font-weight: 700; font-variant-numeric: tabular-nums; }
+table.answers tr:first-child td.value { font-size: 2.1rem; line-height: 1.2; }
 div.result { margin: 1.4rem 0 .6rem; padding: .7rem 1.1rem; border-left: .6rem solid currentColor; }
 div.result p { margin: .2rem 0; }
 p.word { font-size: 2.4rem; line-height: 1.15; font-weight: 700; }
@@ -71,6 +78,10 @@ table.pairs td:first-child { width: 14rem; color: var(--c5b6775); }
 pre { padding: .9rem 1rem; background: var(--shade); border-radius: 4px; white-space: pre-wrap; overflow-wrap: anywhere;
   font: .84rem/1.45 ui-monospace, "DejaVu Sans Mono", monospace; }
 footer { margin-top: 3rem; color: var(--c5b6775); font-size: .85rem; overflow-wrap: anywhere; }
+@media screen and (max-width: 34rem) { table.answers tr { display: grid; padding: .35rem 0;
+  border-bottom: 1px solid var(--ce3e7ec); }
+  table.answers th, table.answers td { padding: 0; border: 0; } table.answers td:empty { display: none; }
+  table.answers tr:first-child td.value { font-size: 1.7rem; } }
 @page { margin: 16mm 16mm 18mm;
   @bottom-right { content: counter(page) " / " counter(pages); font-size: 8pt; } }
 @media print {
@@ -79,6 +90,7 @@ footer { margin-top: 3rem; color: var(--c5b6775); font-size: .85rem; overflow-wr
   header, section.appendix { break-after: page; } section.appendix { break-before: page; break-after: auto; }
   header svg.figure { max-height: 76mm; }
   dl.facts { clear: both; grid-template-columns: repeat(3, 1fr); gap: .15rem 1rem; }
+  table.answers td.value { font-size: 12pt; } table.answers tr:first-child td.value { font-size: 20pt; }
   p.word { font-size: 20pt; } p.why { font-size: 11pt; } div.signatures { margin-top: 14mm; }
   h1 { font-size: 18pt; } h2 { font-size: 12.5pt; margin-top: 16pt; break-after: avoid; }
   figure, ul.verdict li, dl.facts div, tr { break-inside: avoid; }

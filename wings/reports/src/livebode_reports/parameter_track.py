@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -9,6 +10,8 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Floats
 from livebode.core import OK
+from livebode.fitting import NO_RESPONSE
+from livebode.language import listed, number, worded
 from livebode.records import RunRecord
 
 _COLUMNS = ("sample", "time_s", "model", "name", "value", "sigma", "unit", "status")
@@ -84,6 +87,16 @@ def _add(track: Track, name: str, rows: dict[str, NDArray[np.generic]], kept: ND
         )
 
 
+def fitted(track: Track) -> int:
+    """Number of fits: not of the responses that have too few valid lines for one, as after a start or a gap."""
+    return sum(count for word, count in track.statuses.items() if word != NO_RESPONSE)
+
+
 def failed(track: Track) -> dict[str, int]:
     """Numbers of rejected fits by status."""
-    return {word: count for word, count in track.statuses.items() if word != OK}
+    return {word: count for word, count in track.statuses.items() if word not in (OK, NO_RESPONSE)}
+
+
+def reasons(failed: Mapping[str, int]) -> str:
+    """Numbers of rejected fits with their reasons, as a list."""
+    return listed(f"{number(count, ',')} {worded(word)}" for word, count in failed.items())

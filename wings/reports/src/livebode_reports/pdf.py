@@ -18,6 +18,7 @@ from typing import Any
 import typst
 
 from livebode.core import (
+    Answer,
     Document,
     Finding,
     Listing,
@@ -204,6 +205,7 @@ class _Data:
             "colours": {"ink": LIGHT.ink, "muted": LIGHT.muted, "grid": LIGHT.grid},
             "tone_colours": TONE_COLOURS, "subject": text(of.kind), "title": _heading(of.title), "foot": text(of.foot),
             "heading": _heading(of.heading), "facts": [list(map(text, pair)) for pair in of.facts], "logo": logo,
+            "answers": [self._answer(a) for a in of.answers], "about_answers": text(of.about_answers),
             "verdict": [self._finding(f) for f in of.verdict], "result": [self._finding(f) for f in of.result],
             "picture": None if of.picture is None else self._part(of.picture),
             "signatures": list(map(text, of.signatures)),
@@ -214,6 +216,11 @@ class _Data:
     def _finding(self, finding: Finding) -> dict[str, str]:
         word = readable(worded(self._of.tones[finding.tone]))
         return {"tone": finding.tone, "word": word, "text": readable(finding.text)}
+
+    def _answer(self, answer: Answer) -> dict[str, Any]:
+        word = "" if answer.tone is None else worded(self._of.tones[answer.tone])
+        texts = {name: readable(value) for name, value in vars(answer).items() if name != "tone"}
+        return texts | {"tone": answer.tone or "open", "word": readable(word)}
 
     def _section(self, section: Section) -> dict[str, Any]:
         return {"title": _heading(section.title), "parts": [self._part(part) for part in section.parts]}

@@ -13,6 +13,7 @@ from livebode.plugins import loaded, named
 from livebode.records import RunRecord
 from livebode_reports import first_page, sections
 from livebode_reports.acceptance import LimitResult
+from livebode_reports.answers import about_answers, answers
 from livebode_reports.limits import limits
 from livebode_reports.measurement_words import details, distortion, how
 from livebode_reports.report_data import ReportData, RunData, entry_title, read, recordings, written
@@ -20,9 +21,10 @@ from livebode_reports.verdict import verdict
 from livebode_reports.wording import duration
 
 _MEASURED = (
-    how, sections.response, distortion, sections.tracking, sections.parameters, sections.motion, sections.margins,
+    how, distortion, sections.tracking, sections.parameters, sections.motion, sections.margins,
 )  # fmt: skip
-_RECORDED = sections.events, sections.quality, sections.validation
+_RECORDED = sections.events, sections.validation
+_NUMBERS = sections.response, sections.quality
 _APPENDIX = (details, sections.source_state, sections.settings, sections.versions)
 
 
@@ -49,7 +51,7 @@ def run_report(
     header
         The first page and the limits. Default: the [report] with which the run was recorded.
     appendix
-        Add the raw configuration, the versions, and what the report does not contain.
+        Add to the appendix the raw configuration, the versions, and what the report does not contain.
 
     Raises
     ------
@@ -89,10 +91,12 @@ def report_of(of: ReportData, *, made: datetime, appendix: bool = False) -> Docu
         sections=tuple(section for section in there if section is not None),
         heading=tr("Findings"),
         foot=" · ".join(filter(None, (title, of.header.serial_number, of.header.company))),
+        answers=answers(of),
+        about_answers=about_answers(of),
         result=first_page.result(findings, of.accepted, not_judged(of)),
         picture=sections.average(of),
         signatures=first_page.signatures(of.header),
-        appendix=_appendix(of, absent) if appendix else (),
+        appendix=(*(make(of) for make in _NUMBERS), *(_appendix(of, absent) if appendix else ())),
         logo=first_page.logo_of(of.header),
         paper=of.header.paper,
         made=made,

@@ -8,11 +8,22 @@ from typing import Any
 import numpy as np
 
 from livebode.analysis import MARGINS, loop_section
-from livebode.core import INTERVAL_FACTOR, Listing, Paragraph, Part, Picture, PrintedTable, Section, moment, with_bound
+from livebode.core import (
+    INTERVAL_FACTOR,
+    OK,
+    Listing,
+    Paragraph,
+    Part,
+    Picture,
+    PrintedTable,
+    Section,
+    moment,
+    with_bound,
+)
 from livebode.fitting import Fit
-from livebode.language import Message, listed, number, tr, worded
+from livebode.language import Message, listed, number, quantity_name, tr, worded
 from livebode_reports.events import alarms
-from livebode_reports.parameter_track import Track
+from livebode_reports.parameter_track import Track, reasons
 from livebode_reports.report_data import ReportData, RunData, by_schedule
 from livebode_reports.wording import (
     line_table,
@@ -31,12 +42,9 @@ def average(of: ReportData) -> Picture:
     """The mean with its bounds and the fitted model: the picture of the first page."""
     mean = of.of.response
     names = (of.channels["input"], of.channels["output"]) if {"input", "output"} <= of.channels.keys() else None
-    caption = tr(
-        "Bars: {what}, with 95 % bounds. Light: range of 5–95 % of the single responses{thinned}.",
-        what=worded(of.of.words), thinned=_drawn(of, len(of.of.overview)),
-    )  # fmt: skip
+    caption = tr("Measured: {what}, with 95 % bounds.", what=worded(of.of.words))
     if of.fit:
-        caption += tr(" Dashed: the {model} model fitted to it.", model=worded(of.fit.model.name))
+        caption += " " + tr("Dashed: the {model} model fitted to it.", model=worded(of.fit.model.name))
     return Picture("bode", {"responses": of.of.overview, "mean": mean, "names": names, "fitted": of.fit}, caption)
 
 
@@ -83,9 +91,7 @@ def parameters(of: ReportData) -> Section | str:
         now = newest.get(name)
         mean = with_bound(*fitted[name]) if name in fitted else (tr("fixed") if now and not now.sigma else "—", "")
         late = with_bound(now.value, INTERVAL_FACTOR * now.sigma) if now else ("—", "")
-        rows.append(
-            (worded(name.replace("_", " ")), *mean, *late, worded(units.get(name) or (now.unit if now else "")))
-        )
+        rows.append((quantity_name(name), *mean, *late, worded(units.get(name) or (now.unit if now else ""))))
     note = tr("± covers 95 % if the model is complete.")
     if of.fit:
         note = tr("Of the mean: {bounds}.", bounds=worded(of.fit.about_bounds))
@@ -123,12 +129,14 @@ def motion(of: ReportData) -> Section | None:
     if model is None:
         return None
     words = tr(
-        "The newest chunk's model: Js {inertia:.5g} kg m², mL {load:.5g} kg; by position:",
+        "The newest chunk's model: motor inertia {inertia:.5g} kg m², load mass {load:.5g} kg; by position:",
         inertia=model["inertia_kg_m2"], load=model["load_kg"],
     )  # fmt: skip
     columns = zip(model["position_m"], model["stiffness_n_per_m"], model["damping_n_s_per_m"])
     rows = tuple((number(x, ".4g"), number(k, ".5g"), number(b, ".4g")) for x, k, b in columns)
-    table = PrintedTable((tr("position in m"), tr("Keff in N/m"), tr("bs in N s/m")), rows, (0, 1, 2))
+    table = PrintedTable(
+        (tr("position in m"), tr("belt stiffness in N/m"), tr("belt damping in N s/m")), rows, (0, 1, 2)
+    )
     return Section(tr("Motion"), (Paragraph(words), table))
 
 
@@ -162,7 +170,7 @@ def events(of: RunData) -> Section:
 
 
 def quality(of: RunData) -> Section:
-    """Gaps, bad samples and invalid responses."""
+    """Gaps, bad samples, and the responses and fits that are not valid, as those of a start."""
     counts, extent = of.run.summary.get("counts", {}), of.extent
     rows = [
         (tr("samples"), number(of.samples, ",")),
@@ -170,11 +178,18 @@ def quality(of: RunData) -> Section:
         (tr("responses"), number(extent.count, ",")),
         (tr("with an invalid line"), f"{number(extent.incomplete, ',')} ({share(extent.incomplete, extent.count)})"),
     ]
-    table = pairs(rows)
-    parts: list[Part] = [table]
+    if isinstance(of, ReportData):
+        rows += [(tr("fits over the run"), _counted(track)) for track in of.tracks.values() if track.model != MARGINS]
+    parts: list[Part] = [pairs(rows)]
     if "counts" not in of.run.summary:
         parts.append(Paragraph(tr("The counts of samples are written at the end of the run.")))
     return Section(tr("Data quality"), tuple(parts))
+
+
+def _counted(track: Track) -> str:
+    """Number of fits, and why rows have none."""
+    rows, without = sum(track.statuses.values()), {word: n for word, n in track.statuses.items() if word != OK}
+    return number(rows, ",") + (f" ({tr('rejected')}: {reasons(without)})" if without else "")
 
 
 def source_state(of: RunData) -> Section | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from math import isfinite
 
 from livebode.analysis import MARGINS, worst
@@ -10,9 +11,9 @@ from livebode.core import Finding, Tone
 from livebode.language import listed, number, tr, trn, worded
 from livebode.records import RunRecord
 from livebode_reports.events import alarms
-from livebode_reports.parameter_track import failed
+from livebode_reports.parameter_track import failed, fitted, reasons
 from livebode_reports.report_data import ReportData, RunData
-from livebode_reports.wording import lines_of, share
+from livebode_reports.wording import share
 
 _URGENT: dict[Tone, int] = {"alarm": 0, "differs": 0, "check": 1, "open": 2, "ok": 3}
 _INVALID_MANY = 0.05  # share of the rows
@@ -23,7 +24,8 @@ _PHASE_MIN_DEG, _MS_MAX = 30.0, 2.0
 
 def verdict(of: ReportData) -> tuple[Finding, ...]:
     """The findings, the most urgent first."""
-    return by_urgency([*about_record(of), *_valid(of), *_fits(of), *_margins(of), *_validated(of)])
+    measurement = of_measurement(_valid(of), _fits(of), _validated(of))
+    return by_urgency([*about_record(of), *_margins(of), *measurement])
 
 
 def by_urgency(findings: Iterable[Finding]) -> tuple[Finding, ...]:
@@ -33,12 +35,17 @@ def by_urgency(findings: Iterable[Finding]) -> tuple[Finding, ...]:
 
 def about_record(of: RunData) -> list[Finding]:
     """The findings about alarms, the record and its signals."""
-    return [*alarms(of.run, of.event_summary), *_record(of), *_ready(of), *_signals(of)]
+    return [*alarms(of.run, of.event_summary), *of_measurement(_record(of), _ready(of), _signals(of))]
+
+
+def of_measurement(*findings: Iterable[Finding]) -> list[Finding]:
+    """Findings that are not about the machine: these do not become its verdict."""
+    return [replace(finding, subject="measurement") for each in findings for finding in each]
 
 
 def _record(of: RunData) -> list[Finding]:
     findings = []
-    if not of.run.finished:
+    if not of.run.ended:
         findings.append(
             Finding(
                 "check",
@@ -102,16 +109,15 @@ def _gaps(gaps: int, missing: int) -> str:
 
 
 def _valid(of: ReportData) -> list[Finding]:
-    bad, every = of.of.incomplete, of.of.count
-    text = trn(
-        "{n:,} response at {lines}; {bad:,} of them ({share}) have an invalid line (the first window after a start or "
-        "a gap is always invalid).",
-        "{n:,} responses at {lines}; {bad:,} of them ({share}) have an invalid line (the first window after a start "
-        "or a gap is always invalid).",
-        every, lines=lines_of(len(of.run.lines)), bad=bad, share=share(bad, every),
-    )  # fmt: skip
-    unexpected = bad - _after_starts(of.run)
-    findings = [Finding("check" if unexpected > _INVALID_MANY * every else "ok", text)]
+    unexpected, every = of.of.incomplete - _after_starts(of.run), of.of.count
+    findings = []
+    if unexpected > _INVALID_MANY * every:
+        text = trn(
+            "{bad:,} of {n:,} response ({share}) has an invalid line, beside those that contain a start or a gap.",
+            "{bad:,} of {n:,} responses ({share}) have an invalid line, beside those that contain a start or a gap.",
+            every, bad=unexpected, share=share(unexpected, every),
+        )  # fmt: skip
+        findings.append(Finding("check", text))
     if never := [f"{number(f, 'g')} Hz" for f, n in zip(of.run.lines.frequency_hz, of.of.valid) if not n]:
         lines = listed(never[:8]) + " …" * (len(never) > 8)
         findings.append(Finding("check", tr("Never valid: {lines}.", lines=lines)))
@@ -139,15 +145,14 @@ def _fits(of: ReportData) -> list[Finding]:
     findings = [Finding("check" if rough else "ok", text)]
     for track in of.tracks.values():
         if track.model != MARGINS and (why := failed(track)):
-            every, not_ok = sum(track.statuses.values()), sum(why.values())
-            reasons = listed(f"{number(count, ',')} {worded(word)}" for word, count in why.items())
-            tone: Tone = "check" if not_ok > _INVALID_MANY * every else "ok"
-            text = trn(
-                "Of {n:,} fit over the run, {rejected:,} were rejected: {reasons}.",
-                "Of {n:,} fits over the run, {rejected:,} were rejected: {reasons}.",
-                every, rejected=not_ok, reasons=reasons,
-            )  # fmt: skip
-            findings.append(Finding(tone, text))
+            every, rejected = fitted(track), sum(why.values())
+            if rejected > _INVALID_MANY * every:
+                text = trn(
+                    "Of {n:,} fit over the run, {rejected:,} was rejected: {reasons}.",
+                    "Of {n:,} fits over the run, {rejected:,} were rejected: {reasons}.",
+                    every, rejected=rejected, reasons=reasons(why),
+                )  # fmt: skip
+                findings.append(Finding("check", text))
     return findings
 
 

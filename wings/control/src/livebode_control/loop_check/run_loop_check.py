@@ -229,7 +229,7 @@ def _of_logs(words: dict[str, Any], names: list[str], where: str) -> Block:
     given, ready = axis.source, axis.ready
     stretches = []
     for log in given.logs:
-        opened = open_log(log, rate_hz=given.rate_hz, time=given.time, dbc=given.dbc, channels=names)
+        opened = open_log(log, rate_hz=given.rate_hz, time=given.time, dbc=given.dbc, channels=names, units=given.units)
         stretches.append(clean_stretch(opened, names, ready if ready and opened.has(ready.channel) else None)[0])
     return max(stretches, key=len)
 

@@ -214,11 +214,11 @@ def show_schedule(schedule: GainSchedule) -> None:
 
 
 def show_feedforward(forward: Feedforward | None) -> None:
-    """Print inertia and friction with their bounds, in the units of the recording."""
+    """Print inertia and friction with their bounds, in SI units."""
     if forward is None:
         print("feedforward: the lines do not show the inertia")
         return
-    print("feedforward (95 %, units of the recording)")
+    print("feedforward (95 %, SI units)")
     for name in ("inertia", "viscous", "coulomb", "offset"):
         if (value := getattr(forward, name)) is not None:
             print(f"  {name:32}{value:>12.5g} ± {getattr(forward, f'{name}_bound'):.2g}")

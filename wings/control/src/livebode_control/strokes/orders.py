@@ -127,7 +127,7 @@ def orders_of(
         Channel of the motor's angle. Default: the output, or its integral if it is a velocity; the phase then counts
         from the first sample.
     turn
-        Units of the angle in one turn of the motor. Default: 2π.
+        Angle of one turn of the motor, in rad, or in the unit of a channel that has no SI unit. Default: 2π.
     lines_hz
         Lines of the time, such as those of an excitation that runs at the same time. Those that the strokes tell from
         the orders are subtracted (`without_lines`); windows that meet the others are left out.

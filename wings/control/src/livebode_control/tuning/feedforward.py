@@ -19,7 +19,7 @@ _SHARE = (1e-9, 10.0)  # of the size, by which the model may be wrong
 
 @dataclass(frozen=True)
 class Feedforward:
-    """Torque of a reference motion: inertia·a + viscous·v + coulomb·sign(v) + offset, in the units of the recording.
+    """Torque of a reference motion: inertia·a + viscous·v + coulomb·sign(v) + offset, in SI units.
 
     Bounds are half-widths of 95 %. Friction is None where no strokes show it; `curve` is what it is from.
     """

@@ -27,7 +27,7 @@ def parameter_keys(controller: Model) -> dict[str, str]:
 
 
 def gains_toml(controller: Model) -> str:
-    """The gains and times of a proposed controller, in the units of the recording.
+    """The gains and times of a proposed controller, in SI units.
 
     >>> print(gains_toml(PID(gain=0.2, integral_time_s=0.1, rate_hz=4000)))
     # Gains proposed by livebode tune. Nothing is written to a machine.

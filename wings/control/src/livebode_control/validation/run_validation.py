@@ -63,7 +63,9 @@ def validate_run(
         )
     notes = _freshness(axis.source.logs, log)
     given = axis.source
-    opened = open_log(log, rate_hz=given.rate_hz, time=given.time, dbc=given.dbc, channels=[signals.output])
+    opened = open_log(
+        log, rate_hz=given.rate_hz, time=given.time, dbc=given.dbc, channels=[signals.output], units=given.units
+    )
     if signals.excitation and "excitation" not in named and not opened.has(signals.excitation):
         notes.append(
             Message(

@@ -203,7 +203,7 @@ def _tracked_alike(directory: Path, on: Path, channels: Channels) -> Axis:
     own = recorded_configuration(RunRecord.open(directory, matrix=True).summary)
     data = {name: own[name] for name in ("signals", "lines", "tracking", "experiments", "loop") if name in own}
     of_source = own.get("source", {})
-    source = {name: of_source[name] for name in ("rate_hz", "time", "dbc", "kinds") if name in of_source}
+    source = {name: of_source[name] for name in ("rate_hz", "time", "dbc", "kinds", "units") if name in of_source}
     signals = data.get("signals", {}) | {role: name for role, name in channels.items() if name}
     return Axis.of(data | {"source": source | {"log": on}, "signals": signals}, str(directory))
 

@@ -23,12 +23,13 @@ from livebode.sources.live import (
     UNDECIDED_S_MAX,
     Address,
     AnyBatch,
+    FieldDecoder,
     FrameDecoder,
-    LineDecoder,
     LiveSource,
     Position,
     encode_line,
     existing,
+    message_decoder,
     password,
     read_header,
 )
@@ -149,7 +150,7 @@ class MqttSource(LiveSource):
             )
         self._password = password(settings.password_env, settings.password_file)
         self._tls = tls_context(settings) if address.scheme == "mqtts" else None
-        self._frames, self._lines = FrameDecoder(), LineDecoder(settings.rate_hz)
+        self._frames, self._lines = FrameDecoder(), message_decoder(settings)
         self._unanswered = 0
         self._older, self._unsupported = False, False
         self._refusal: SourceError | None = None
@@ -170,6 +171,8 @@ class MqttSource(LiveSource):
     def _receive(self) -> bool:
         client = self._client()
         self._answered, unsupported = False, self._unsupported
+        if isinstance(self._lines, FieldDecoder):
+            self._lines = message_decoder(self.settings)
         self._in_flight = InFlight()  # the broker sends again what was not acknowledged, with other numbers
         try:
             self._connect(client)
@@ -286,7 +289,7 @@ class MqttSource(LiveSource):
         try:
             batch = self._decode(message.payload)
         except LivebodeError as error:
-            self._malformed(error)
+            self._malformed(error, message.payload)
         if batch is not None or self._announcement is message.payload:
             settles += 1  # an announcement is stored until the next samples are recorded
         if batch is not None:
@@ -300,6 +303,8 @@ class MqttSource(LiveSource):
 
     def _decode(self, payload: bytes) -> AnyBatch | None:
         """The batch in a message; remembers how a later one can be decoded."""
+        if isinstance(self._lines, FieldDecoder):
+            return self._lines.decode(payload)
         if payload[:1] != b"{":
             batch = self._frames.decode(payload)
             header = read_header(payload)

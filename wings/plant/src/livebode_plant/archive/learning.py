@@ -13,6 +13,7 @@ import pyarrow.compute as pc
 from livebode.analysis import check_no_matrix, learn_from, learnable_axis, reads_recordings
 from livebode.configuration import Axis
 from livebode.core import LEVELS, ArchiveError, LivebodeError, counted, nearest_name
+from livebode.language import quantity_name
 from livebode.locations import local_copy
 from livebode.monitoring import Baseline
 from livebode.records import content_sha256
@@ -171,7 +172,7 @@ def _changes(lake: Lake, of: Selection) -> tuple[dict[str, list[str]], dict[str,
         for ranked in assessment.ranked:
             if ranked.significant:
                 jumped = any(change.kind == "jump" for change in ranked.trend.changes)
-                words = sentence(ranked, history.name, history.unit_of(ranked.machine)).rstrip(".")
+                words = sentence(ranked, quantity_name(history.name), history.unit_of(ranked.machine)).rstrip(".")
                 (jumps if jumped else drifts).setdefault(ranked.machine, []).append(words)
     return jumps, drifts
 

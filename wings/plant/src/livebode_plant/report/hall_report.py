@@ -8,14 +8,13 @@ from datetime import datetime
 from typing import Any
 
 from livebode.core import Document, Finding, Paragraph, Picture, PrintedTable, Section, Tone, date_and_time
-from livebode.language import listed, number, tr, trn, worded
+from livebode.language import listed, number, quantity_name, tr, trn, worded
 from livebode_plant.report.trend_words import (
     amount,
     change_words,
     day,
     months,
     outlook,
-    quantity_name,
     scale,
     sentence,
     year_of,
@@ -94,7 +93,7 @@ class Hall:
                 {
                     "axis": each.machine,
                     "quantity": history.name,
-                    "sentence": sentence(each, history.name, history.unit_of(each.machine)),
+                    "sentence": sentence(each, quantity_name(history.name), history.unit_of(each.machine)),
                 }
                 for each, history in self.changed
             ],
@@ -131,7 +130,7 @@ class Hall:
             (tr("axes"), number(len(axes), ",")),
             (tr("runs"), number(sum(runs for runs, _, _ in axes.values()), ",")),
             (tr("recordings in quarantine"), number(len(self.quarantined), ",")),
-            (tr("quantities"), listed(quantity_name(of.history) for of in self.assessments)),
+            (tr("quantities"), listed(quantity_name(of.history.name) for of in self.assessments)),
             (tr("report written"), date_and_time(made.timestamp())),
         )
 
@@ -154,7 +153,7 @@ class Hall:
 
     def _findings(self) -> Iterator[Finding]:
         for one, history in self.changed[:_SENTENCES]:
-            words = sentence(one, quantity_name(history), history.unit_of(one.machine))
+            words = sentence(one, quantity_name(history.name), history.unit_of(one.machine))
             yield Finding(self._tone(one), " ".join(filter(None, (words, outlook(one, self.limit_percent)))))
         if (more := len(self.changed) - _SENTENCES) > 0:
             yield Finding(
@@ -204,7 +203,7 @@ class Hall:
         trend, unit = one.trend, history.unit_of(one.machine)
         return (
             one.machine,
-            quantity_name(history),
+            quantity_name(history.name),
             amount(trend, trend.per_month, trend.per_month_bound_95, unit),
             amount(trend, trend.change, trend.change_bound_95, unit),
             scale(trend, unit)[1],
@@ -226,15 +225,15 @@ class Hall:
         reasons: dict[tuple[str, str], list[str]] = {}
         for of in self.assessments:
             for axis, reason in of.not_assessed.items():
-                reasons.setdefault((axis, reason), []).append(quantity_name(of.history))
+                reasons.setdefault((axis, reason), []).append(quantity_name(of.history.name))
             if of.history.undated:
                 reason = trn("{n:,} run without a date", "{n:,} runs without a date", of.history.undated)
-                reasons.setdefault(("", reason), []).append(quantity_name(of.history))
+                reasons.setdefault(("", reason), []).append(quantity_name(of.history.name))
             if of.history.other_recipes:
                 reason = trn(
                     "{n:,} run with other settings", "{n:,} runs with other settings", of.history.other_recipes
                 )
-                reasons.setdefault(("", reason), []).append(quantity_name(of.history))
+                reasons.setdefault(("", reason), []).append(quantity_name(of.history.name))
         rows = [(axis, listed(names), worded(reason)) for (axis, reason), names in reasons.items()]
         rows += [(axis, tr("recording in quarantine"), reason) for axis, reason in self.quarantined]
         if not rows:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Floats
 from livebode.core import with_bound
-from livebode.language import listed, number, tr, trn, worded
+from livebode.language import listed, number, quantity_name, tr, trn
 from livebode.pictures import Style, drawing, heading, labelled, new_figure, plain, shortened, style
 from livebode_plant.trending import LOGARITHMIC, ChangePoint, History, Ranked, Trend
 
@@ -223,11 +223,6 @@ def scale(trend: Trend, unit: str) -> tuple[float, str]:
     return (trend.relative, "%") if isfinite(trend.relative) and unit not in LOGARITHMIC else (1.0, unit)
 
 
-def quantity_name(history: History) -> str:
-    """The name of the quantity in the language in use."""
-    return worded(history.name.replace("_", " "))
-
-
 def amount(trend: Trend, value: float, bound: float, unit: str) -> str:
     """A change with its bound, as "−0.79 ± 0.02"."""
     factor, _ = scale(trend, unit)
@@ -324,7 +319,7 @@ def year_of(history: History, machine: str, trend: Trend) -> Year:
     if trend.slope_since_s > trend.since_s:
         slope = tr("{slope} since {day}", slope=slope, day=day(trend.slope_since_s))
     return Year(
-        title=tr("{quantity} of {machine}", quantity=quantity_name(history), machine=machine),
+        title=tr("{quantity} of {machine}", quantity=quantity_name(history.name), machine=machine),
         facts=f"{slope} · {about_method(trend)}",
         label=labelled(history.name, unit),
         time_s=trend.time_s,

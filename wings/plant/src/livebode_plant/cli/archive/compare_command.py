@@ -60,10 +60,11 @@ def compare_command(
 
 def _row(of: LevelDifference) -> tuple[str, ...]:
     from livebode.core import with_bound
+    from livebode.language import quantity_name
 
     percent = 100 / abs(of.first) if of.first and of.unit != "dB" else None
     return (
-        of.name + " *" * of.significant, f"{of.first:.5g}", f"{of.second:.5g}",
+        quantity_name(of.name) + " *" * of.significant, f"{of.first:.5g}", f"{of.second:.5g}",
         " ± ".join(with_bound(of.amount, of.bound_95)),
         "" if percent is None else " ± ".join(with_bound(percent * of.amount, percent * of.bound_95)), of.unit,
         f"{of.runs[0]} / {of.runs[1]}",

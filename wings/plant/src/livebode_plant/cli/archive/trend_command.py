@@ -142,11 +142,12 @@ def _row(of: Assessment, one: Ranked) -> dict[str, Any]:
 
 def _print(of: Assessment, limit: float) -> None:
     from livebode.core import counted
+    from livebode.language import quantity_name
     from livebode_plant.report.trend_words import amount, change_words, months, scale
 
     history = of.history
     machines, runs = counted(len(history.machines), "machine"), counted(history.runs, "run")
-    print(f"{history.name} ({history.model}): {machines}, {runs}")
+    print(f"{quantity_name(history.name)} ({history.model} model): {machines}, {runs}")
     rows = []
     for ranked in of.ranked:
         trend, unit = ranked.trend, history.unit_of(ranked.machine)

@@ -103,7 +103,7 @@ function facts(row) {
       row.value === null || row.change_percent === null
         ? value(row)
         : tr("{value}, {percent} % from the baseline", { value: value(row), percent: signed(row.change_percent, 1) });
-    found.push([worded(row.parameter), text]);
+    found.push([worded(row.parameter.replaceAll("_", " ")), text]);
   }
   if (row.kind && row.state !== "normal")
     found.push([tr("Alarm"), [kindWords(row.kind), since(row.raised_s), ...persons(row)].filter(Boolean).join(" · ")]);

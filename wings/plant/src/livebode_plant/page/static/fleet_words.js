@@ -69,7 +69,7 @@ export function remarks(row) {
   const found = [];
   if (row.kind && row.state !== "normal") found.push(kindWords(row.kind));
   if (row.change_percent !== null && row.parameter && row.value !== null)
-    found.push(`${worded(row.parameter)} ${signed(row.change_percent, 1)}\u00a0%`);
+    found.push(`${worded(row.parameter.replaceAll("_", " "))} ${signed(row.change_percent, 1)}\u00a0%`);
   if (row.lag_s !== null && row.lag_s > 2) found.push(tr("newest response {time} ago", { time: span(row.lag_s) }));
   if (row.lost) found.push(tr("{count} samples lost", { count: thousands(row.lost) }));
   return found;
