@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,7 +15,6 @@ from tests.support.browser import Tab, chromium
 from tests.support.command import livebode, signals, write_csv
 
 DESK, PHONE = {"width": 1440, "height": 900}, {"width": 390, "height": 844}
-_VERSION = re.compile(rb'"[0-9a-f]{12,}"')
 _MOMENT = re.compile(rb"\d{4}-\d\d-\d\d[ T]\d\d:\d\d(:\d\d)?")
 
 
@@ -77,9 +77,9 @@ def test_a_baseline_is_that_of_the_terminal(tab: Tab, folder: Path, monkeypatch:
     assert here.code == 0, here.err
     assert page.inner_text("#output").splitlines()[0] == here.out.splitlines()[0]
     files = folder / "baselines/press 3.json", folder.parent / "terminal.json"
-    own, expected = (_VERSION.sub(b"", without_moments(path)) for path in files)
-    assert len(own) > 1000
-    assert own == expected
+    own, expected = (json.loads(path.read_text()) for path in files)
+    assert own.keys() == expected.keys()
+    assert {key for key in own if own[key] != expected[key]} <= {"learned", "crc32"}
 
     with page.expect_download() as downloading:
         page.click('a[download="press 3.json"]')
