@@ -36,8 +36,12 @@ def sides(tab: Tab) -> Iterator[list[str] | None]:
     tab.page.locator("#theme").click()
     assert tab.js("document.documentElement.dataset.theme") == "dark"
     tab.page.set_viewport_size(PHONE)  # type: ignore[arg-type]
+    for fold in tab.page.locator("button.fold").all():
+        fold.click()
     yield SIZES
     tab.page.locator("#theme").click()
+    for fold in tab.page.locator("button.fold").all():
+        fold.click()
     tab.page.set_viewport_size(DESK)  # type: ignore[arg-type]
 
 

@@ -54,8 +54,8 @@ def doctor_command(
 ) -> None:
     """Check this computer, a configuration and whether its machine can be reached; its receivers, its schema.
 
-    Exit code 2 where a check or a test message failed. No data is changed; a connection is opened and closed. The first
-    line of a TOML file names the schema for the editor: `#:schema ./axis.schema.json`.
+    Exit code 2 where a check or a test message failed. No data is changed; a live source is listened to for 3 s. The
+    first line of a TOML file names the schema for the editor: `#:schema ./axis.schema.json`.
     """
     check_use(context, "--schema NAME", ("--out",), ("--force",))
     check_use(context, "--receivers list", ())

@@ -11,7 +11,6 @@ from pydantic import Field
 from livebode import fitting
 from livebode.configuration.section import ConfigurationSection, Positive
 from livebode.core import SI_UNITS, ConfigError, PlantKinds, UsageError
-from livebode.fitting.models import MODELS
 from livebode.language import Message
 from livebode.plugins import named
 
@@ -78,7 +77,7 @@ def chosen_model(section: FitSection, kinds: PlantKinds) -> fitting.PhysicalMode
         output = _output_of(kinds)
     # The gain model is of the motor's side only: naming it is no conflict.
     side = None if name == "two-mass-gain" and section.side == "motor" else section.side
-    options = {"side": side, "radius_m": section.radius_m, "inertia_ratio": section.inertia_ratio}
+    options: dict[str, Any] = {"side": side, "radius_m": section.radius_m, "inertia_ratio": section.inertia_ratio}
     if name == "two-mass-gain":
         options |= {"output_unit": kinds.output_unit, "input_unit": kinds.input_unit}
     return fitting.model_named(name, output=output, **options)
@@ -116,7 +115,7 @@ def _unknown(why: str, remedy: str) -> str:
 
 def _units_not_si(model: str, kinds: PlantKinds) -> Iterator[_UnitDoubt]:
     """Of known units that are not those that the model needs."""
-    torque = model in MODELS
+    torque = model in fitting.MODELS
     if kinds.input_unit and (kinds.input_unit != "N m" if torque else kinds.input_unit not in SI_UNITS):
         yield _UnitDoubt(kinds.input_name, kinds.input_unit, "torque")
     if kinds.output_unit and kinds.output_unit not in SI_UNITS:
@@ -147,7 +146,7 @@ def _remedy(doubts: Sequence[_UnitDoubt]) -> str:
     if doubts[0].unit == "N":
         return Message("the model is driven by a torque")
     entries = ", ".join(f'{_toml_key(doubt.name)} = "{_example(doubt)}"' for doubt in doubts)
-    return Message("state what one unit is in [source], as in {units}", units=f"units = {{ {entries} }}")
+    return Message("state what one unit is in [source] of axis.toml, as in {units}", units=f"units = {{ {entries} }}")
 
 
 def _example(doubt: _UnitDoubt) -> str:

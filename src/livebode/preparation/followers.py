@@ -6,7 +6,7 @@ from livebode import estimation
 from livebode.configuration import Axis
 from livebode.core import ConfigError, Lines, SpectraLayout
 from livebode.estimation import Follower, Settings, Tracker, nearest_hop
-from livebode.preparation.plan import make_lines, settings_of
+from livebode.preparation.plan import make_lines, recorded_hop, settings_of
 from livebode.sources import Log
 
 LIVE_RESPONSES_PER_S = 20.0
@@ -77,7 +77,7 @@ def make_settings(axis: Axis, log: Log) -> Settings:
 
         return nonperiodic_settings(axis, log)
     lines = make_lines(axis, log)
-    return settings_of(axis, log.rate_hz, lines)
+    return settings_of(axis, log.rate_hz, lines, recorded_hop(axis, log, lines))
 
 
 def check_spectra(axis: Axis, layout: SpectraLayout, rate_hz: float) -> Lines:

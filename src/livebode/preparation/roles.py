@@ -312,7 +312,10 @@ def _contradicting_loop(spectra: RoleSpectra) -> Suspicion | None:
             line_hz=f[worst],
             times=abs(quotient[worst]),
         ),
-        Message("check the gains in [loop], which are in SI units, or set tracking.estimator to 'joint'; {keep}", keep=_ACCEPT),
+        Message(
+            "check the gains in [loop], which are in SI units, or set tracking.estimator to 'joint'; {keep}",
+            keep=_ACCEPT,
+        ),
         bool(away[worst] > _LOOP_WRONG),
         (settings.input,),
     )

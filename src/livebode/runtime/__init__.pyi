@@ -13,6 +13,7 @@ from livebode.runtime.documents import Document as Document
 from livebode.runtime.documents import FitResults as FitResults
 from livebode.runtime.documents import RunEnded as RunEnded
 from livebode.runtime.documents import RunStarted as RunStarted
+from livebode.runtime.documents import RunStep as RunStep
 from livebode.runtime.documents import Subscriber as Subscriber
 from livebode.runtime.documents import TrackerResults as TrackerResults
 from livebode.runtime.estimate import SEEN_AGAIN_BYTES as SEEN_AGAIN_BYTES

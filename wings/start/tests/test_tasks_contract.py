@@ -11,6 +11,7 @@ import pytest
 from playwright.sync_api import Browser, Page
 
 from livebode.dashboard import Dashboard, ServerSettings
+from livebode.records import RunRecord
 from tests.support.browser import Tab, chromium
 from tests.support.command import livebode, signals, write_csv
 
@@ -225,3 +226,20 @@ def test_a_form_fits_a_phone(browser: Browser, tab: Tab, name: str) -> None:
         phone.page.wait_for_selector("#ask:not([hidden])")
         assert phone.page.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]
         assert phone.wrong == []
+
+
+def test_a_later_run_is_compared_with_the_baseline_that_was_learned(tab: Tab, folder: Path) -> None:
+    page = task(tab, "learn", "monday", "tuesday")
+    page.fill("#field---out", "healthy press")
+    run_task(page)
+    write_csv(folder / "wednesday.csv", signals(4000, seed=7))
+    page.goto(f"{tab.url}measure?recording=wednesday.csv")
+    page.wait_for_selector("#measure:enabled")
+    page.click(".found summary")
+    page.select_option("#baseline", "healthy press")
+    page.wait_for_selector('#text:has-text("baselines/healthy press.json")')
+    page.click("#measure:enabled")
+    page.wait_for_url("**/run/wednesday/")
+    summary = RunRecord.open(folder / "wednesday").summary
+    assert Path(summary["monitoring"]["baseline"]).name == "healthy press.json"
+    assert summary["configuration"]["tracking"].get("average", False) is False

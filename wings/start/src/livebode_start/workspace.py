@@ -36,13 +36,13 @@ def harmless_name(text: str) -> str:
     text = unicodedata.normalize("NFC", text.encode(errors="ignore").decode())
     text = "".join(letter for letter in text if unicodedata.category(letter)[0] != "C")
     text = _FORBIDDEN.sub("_", text).strip(". ")
+    if _DEVICE.fullmatch(text):
+        text = f"_{text}"
     stem, dot, ending = text.rpartition(".")
     if not dot or len(ending) > _ENDING_LETTERS_MAX:
         stem, ending = text, ""
     stem = stem.encode()[:NAME_BYTES_MAX].decode(errors="ignore").strip(". ") or "recording"
     name = f"{stem}.{ending}" if ending else stem
-    if _DEVICE.fullmatch(name):
-        name = f"_{name}"
     return f"{name}.txt" if name.lower().endswith(_OWN) else name
 
 

@@ -290,7 +290,9 @@ class FleetPages:
         return await answer(request)
 
     async def page(self, request: Request) -> Response:
-        return RedirectResponse("/login", 303) if self._board.access.role_of(request) is None else self._file("fleet.html")
+        return (
+            RedirectResponse("/login", 303) if self._board.access.role_of(request) is None else self._file("fleet.html")
+        )
 
     async def axes(self, _: Request) -> Response:
         """Path of each axis in a line, in order; the layout is in a header."""
