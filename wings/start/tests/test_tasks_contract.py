@@ -235,11 +235,27 @@ def test_a_later_run_is_compared_with_the_baseline_that_was_learned(tab: Tab, fo
     write_csv(folder / "wednesday.csv", signals(4000, seed=7))
     page.goto(f"{tab.url}measure?recording=wednesday.csv")
     page.wait_for_selector("#measure:enabled")
+    page.fill("#frequencies", "50, 100, 200")
+    page.fill("#window", "100")
     page.click(".found summary")
     page.select_option("#baseline", "healthy press")
-    page.wait_for_selector('#text:has-text("baselines/healthy press.json")')
+    page.wait_for_selector('#text:has-text("baselines/healthy press.json")', state="attached")
     page.click("#measure:enabled")
     page.wait_for_url("**/run/wednesday/")
     summary = RunRecord.open(folder / "wednesday").summary
     assert Path(summary["monitoring"]["baseline"]).name == "healthy press.json"
     assert summary["configuration"]["tracking"].get("average", False) is False
+
+
+def test_a_job_is_cancelled_by_its_button_and_another_can_start(tab: Tab, folder: Path) -> None:
+    page = task(tab, "design")
+    page.fill("#field---out", "long")
+    page.fill("#field---band", "1:1900")
+    page.fill("#field---resolution", "0.5")
+    page.fill('[name="limits.torque_n_m_max"]', "14.5")
+    page.click("#start")
+    page.click("#job button")
+    page.wait_for_selector('#answer[aria-busy="false"]')
+    assert page.inner_text("#sentence").startswith("Cancelled. stopped; no")
+    assert not (folder / "designs" / "long").exists()
+    assert page.is_enabled("#start")
