@@ -38,7 +38,7 @@ class NoticePrinter:
 
 
 class PercentPrinter:
-    """A subscriber that prints how far a run is, for a program that reads it: a line for each percent, a few a second."""
+    """A subscriber that prints how far a run is, for a program that reads it: a line for a percent, a few a second."""
 
     def __init__(self) -> None:
         self._percent, self._printed_s = -1, float("-inf")

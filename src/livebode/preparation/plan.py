@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 
 from livebode.configuration import Axis
-from livebode.core import ANY_EXCITATION, Block, ConfigError, Event, Lines, LivebodeError
+from livebode.core import ANY_EXCITATION, Block, Channel, ConfigError, Event, Lines, LivebodeError
 from livebode.estimation import FORGETTING, RippleOrder, Settings, default_hop, divisors
 from livebode.language import Message
 from livebode.preparation.checks import check_length
@@ -126,6 +126,27 @@ class RecordedSource(Protocol):
     def blocks(self, channels: Sequence[str] | None = None) -> Iterator[Block]: ...
 
 
+class Recorded(RecordedSource, Protocol):
+    """Samples that can be read again: a Log, or what a live source sent."""
+
+    @property
+    def path(self) -> object: ...
+
+    @property
+    def format(self) -> str: ...
+
+    @property
+    def channels(self) -> tuple[Channel, ...]: ...
+
+    @property
+    def rate_hz(self) -> float: ...
+
+    @property
+    def samples(self) -> int | None: ...
+
+    def naming(self, names: Sequence[str]) -> Recorded: ...
+
+
 def window_in_doubt(axis: Axis, log: Log, settings: Settings) -> list[Event]:
     """An event if the excitation does not repeat with the window that the configuration specifies."""
     if settings.method.reference != "excitation" or not settings.excitation or axis.lines.window == "auto":
@@ -219,7 +240,7 @@ def make_lines(axis: Axis, log: Log) -> Lines:
     return Lines.parse(frequencies, log.rate_hz, recognise(samples, log.rate_hz, doubtful=True).period)
 
 
-def beginning(log: Log, channel: str, samples: int = SEARCHED) -> np.ndarray:
+def beginning(log: RecordedSource, channel: str, samples: int = SEARCHED) -> np.ndarray:
     """The first samples of a channel, from `log.first` on, with NaN where some are missing."""
     return np.asarray(beginnings(log, [channel], samples)[0])
 

@@ -12,7 +12,8 @@ from livebode.core import Responses
 from livebode.records import RunRecord
 from tests.support.browser import Tab, chromium
 from tests.support.command import livebode
-from tests.support.start_pages import CHANNELS, Servo, drop, start_page, write_servo
+from tests.support.start_pages import CHANNELS, drop, start_page
+from tools.two_mass_servo import Servo, write_servo
 
 PHONE = {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobile": True}
 

@@ -24,7 +24,8 @@ from tests.support.errors import refused
 from tests.support.guarded import TOKEN, VIEWER
 from tests.support.many_runs import ask
 from tests.support.peers.peer import PATIENCE_S
-from tests.support.start_pages import Servo, send, start_page, write_servo
+from tests.support.start_pages import send, start_page
+from tools.two_mass_servo import Servo, write_servo
 
 LOCKED = ServerSettings("127.0.0.1", 0, token=TOKEN, viewer_token=VIEWER)
 

@@ -57,14 +57,12 @@ class Changes:
 
 
 def changes(of: RunDifferences) -> Changes:
-    """Fit the same model to the compared response of each run, and compute the margins of the described loops."""
+    """Fit the same model to the compared response of each run, and compute the margins of the described loops.
+
+    The model is that of the [fit] of a run; without one it follows from what the channels measure.
+    """
     own = [recorded_configuration(run.summary) for run in of.runs]
-    section = next((s["fit"] for s in own if "fit" in s), None)
-    if section is None:
-        words = Message(
-            "No parameters: neither run has a [fit] section (`livebode inspect --out axis.toml --fit auto` writes one)."
-        )
-        return Changes((), words, (), Message("No margins: they need a fit."))
+    section: dict[str, object] = next((s["fit"] for s in own if "fit" in s), {})
     model = FitSection.model_validate(section)
     try:
         fits = [
@@ -78,7 +76,10 @@ def changes(of: RunDifferences) -> Changes:
             words = Message("No parameters: the fit to {run} was rejected: {why}.", run=run.path.name, why=fit.sentence)
             return Changes((), words, (), Message("No margins: they need a fit."))
     # A quality factor is the damping ratio again.
-    rows = [{name: row for name, *row in fit.rows() if not name.endswith("_q")} for fit in fits]
+    rows = [
+        {name: (value, bound, unit) for name, value, bound, unit in fit.rows() if not name.endswith("_q")}
+        for fit in fits
+    ]
     quantities = _table(rows)
     words = Message(
         "The {model} model, fitted to the compared responses at {lines} lines.",

@@ -72,7 +72,7 @@ class Workspace:
     def recordings(self) -> list[dict[str, Any]]:
         """Name, bytes and seconds since 1970 of each file with the ending of a recording, the newest first."""
         endings = tuple({ending for table in tables("readers") for format_ in table for ending in format_.suffixes})
-        rows = [
+        rows: list[dict[str, Any]] = [
             {"name": name, "size_bytes": status.st_size, "written": status.st_mtime}
             for name, status in self.files().items()
             if name.lower().endswith(endings)
