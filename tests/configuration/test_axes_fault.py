@@ -188,7 +188,7 @@ def test_odd_configurations_give_axes_or_a_sentence(tmp_path: Path) -> None:
         (b"a = {" + b"b." * 200_000 + b"c = 1}\n", "nested-too-deeply", {}),
         (b"a = " + b"9" * 10_000, "not-toml", {}),
         (b"#" * (FILE_BYTES_MAX + 1), "file-too-long", {"limit_bytes": FILE_BYTES_MAX}),
-        (b"\xff\xfe", "not-text", {}),
+        (b"\xff\xfe\0", "not-text", {}),
         (b"a = 1\na = 2", "not-toml", {}),
         (b"[source]\n[source]", "not-toml", {}),
         (b"\x00", "not-toml", {}),

@@ -129,7 +129,10 @@ def test_a_machine_is_reached_or_not(tmp_path: Path, scheme: str, more: str) -> 
     assert checks["source"]["verdict"] == "failed"
     assert f"127.0.0.1:{port}" in checks["source"]["message"]
     with socket.create_server(("127.0.0.1", port)):
-        assert doctor(path)[1]["source"]["verdict"] == "ok"
+        found = doctor(path)[1]["source"]
+    assert found["verdict"] == "warning"
+    assert f"127.0.0.1:{port}" in found["message"]
+    assert "accepts connections, but nothing came within 3 s" in found["message"]
 
 
 def test_a_device_is_plugged_in_or_not(tmp_path: Path) -> None:
@@ -167,7 +170,7 @@ def test_a_bus_is_there_or_not(tmp_path: Path) -> None:
 def test_a_port_that_another_program_receives_udp_on_fails(tmp_path: Path) -> None:
     port = free_port(socket.SOCK_DGRAM)
     path = axis(tmp_path, f'url = "udp://127.0.0.1:{port}"')
-    assert doctor(path)[1]["source"]["verdict"] == "ok"
+    assert doctor(path)[1]["source"]["verdict"] == "warning"  # free, and silent
     with closing(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) as other:
         other.bind(("127.0.0.1", port))
         assert doctor(path)[1]["source"]["verdict"] == "failed"

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import codecs
 import re
 import tomllib
 from pathlib import Path
 from typing import Any
 
+from livebode.configuration.toml_mistakes import meant_line, meant_path, mistake_at
 from livebode.core import ConfigError, LivebodeError
 
 FILE_BYTES_MAX = 1 << 20
@@ -50,24 +52,58 @@ def parse_table(data: bytes, origin: str) -> dict[str, Any]:
             limit_bytes=FILE_BYTES_MAX,
         )
     try:
-        text = data.decode("utf-8")
+        text = _decoded(data)
         if any(part.count(".") > _PARTS_MAX for part in _BETWEEN_KEYS.split(_QUOTED.sub("", text))):
             raise _too_deep(origin)
         found = tomllib.loads(text)
         _check_texts(found, "", origin, 0)
         return found
-    except UnicodeDecodeError:
-        raise ConfigError(
-            "not-text", f"{origin!r} is not text", "give a configuration in TOML, or a recording", path=origin
-        ) from None
+    except UnicodeDecodeError as error:
+        raise _not_utf8(data, error.start, origin) from None
     except RecursionError:
         raise _too_deep(origin) from None
     except LivebodeError:
         raise
     except ValueError as error:  # also a number with more digits than Python can parse
-        raise ConfigError(
-            "not-toml", f"{origin!r} is not TOML: {one_line(str(error))}", "correct it there", path=origin
-        ) from None
+        raise _not_toml(text, str(error), origin) from None
+
+
+def _decoded(data: bytes) -> str:
+    """The text; an editor of Windows writes a byte order mark first, or UTF-16."""
+    is_utf16 = data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+    return data.decode("utf-16" if is_utf16 else "utf-8-sig").replace("\r\n", "\n")
+
+
+def _not_utf8(data: bytes, at: int, origin: str) -> ConfigError:
+    """The error of a binary file, or of one with another encoding, by its first letter that is not UTF-8."""
+    if b"\0" in data:
+        return ConfigError(
+            "not-text", f"{origin!r} is not text", "give a configuration in TOML, or a recording", path=origin
+        )
+    begin, number = data.rfind(b"\n", 0, at) + 1, data.count(b"\n", 0, at) + 1
+    line = data[begin:].partition(b"\n")[0].decode("cp1252", "replace").strip()
+    return ConfigError(
+        "not-text",
+        f"{origin!r} is not UTF-8 in line {number}: {one_line(line)}",
+        "save it with the encoding UTF-8, in Notepad by Save as",
+        path=origin,
+        line=number,
+    )
+
+
+def _not_toml(text: str, why: str, origin: str) -> ConfigError:
+    """The error of tomllib, with the line and what was probably meant."""
+    found = mistake_at(why, text)
+    meant = None if found is None else meant_line(found[1])
+    if found is None or meant is None:
+        return ConfigError("not-toml", f"{origin!r} is not TOML: {one_line(why)}", "correct it there", path=origin)
+    remedy = f"write {one_line(meant)}"
+    if "\\" in meant:
+        remedy += f" or {one_line(meant.replace(chr(92), '/'))}"
+    return ConfigError(
+        "not-toml", f"{origin!r} is not TOML in line {found[0]}: {one_line(found[1])}", remedy,
+        path=origin, line=found[0],
+    )  # fmt: skip
 
 
 def shortened(value: Any) -> str:
@@ -128,6 +164,14 @@ def _check_text(text: str, place: str, origin: str) -> None:
             "shorten it",
             key=place,
             limit=long,
+        ).at(origin)
+    if (path := meant_path(text)) is not None:
+        raise ConfigError(
+            "value-invalid",
+            f"{place} = {shortened(text)} has a backslash in double quotes, which begins a special letter",
+            f"write '{path}' in single quotes, or {path.replace(chr(92), '/')}",
+            key=place,
+            value=shortened(text),
         ).at(origin)
     if not text.isprintable():
         raise ConfigError(

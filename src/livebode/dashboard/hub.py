@@ -12,7 +12,17 @@ from typing import Any
 from livebode.analysis import Overview
 from livebode.core import Block, Event, Parameters, Responses
 from livebode.dashboard.signal_tap import SignalTap
-from livebode.runtime import Channels, ClockSet, Document, FitResults, RunControl, RunEnded, RunStarted, TrackerResults
+from livebode.runtime import (
+    Channels,
+    ClockSet,
+    Document,
+    FitResults,
+    RunControl,
+    RunEnded,
+    RunStarted,
+    RunStep,
+    TrackerResults,
+)
 from livebode.sources.live import Health, LiveBlock
 
 Item = Responses | tuple[Parameters, ...] | Event
@@ -68,21 +78,22 @@ class Hub:
             case Event():
                 with self._lock:
                     self._events.append(document)
-            case TrackerResults(block, samples, total):
+            case TrackerResults(block):
                 self._count(block)
-                self._complete = total is not None and samples >= total
             case RunStarted():
                 self._begin(document)
             case Channels(used):
                 self.signals.begin(used, (self.begun or {}).get("found", {}).get("window", 0))
             case ClockSet(pieces):
                 self.clock = pieces
+            case RunStep("ending"):
+                self._complete = True
             case RunEnded(summary):
                 self.ended = summary
 
     @property
     def ending(self) -> bool:
-        """Whether no more samples are expected: the recording is at its end, or a person ended the run."""
+        """Whether no more samples follow: the source is at its end, or a person ended the run; pictures are drawn."""
         return self._complete or (self.control is not None and self.control.ended)
 
     def record(self, event: Event) -> bool:

@@ -14,7 +14,7 @@ from livebode.doctor.subject import Subject
 def examine(subject: Subject, directory: Path) -> list[Check]:
     """What is right and wrong with this computer, and with the subject.
 
-    Nothing is changed: a nameless file is written to the disk and removed, and connections are opened and closed.
+    Nothing is changed: a nameless file is written to the disk and removed, and live sources are listened to.
 
     Parameters
     ----------

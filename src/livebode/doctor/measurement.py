@@ -9,6 +9,7 @@ from pathlib import Path
 
 from livebode.configuration import Axis, open_recordings, with_log
 from livebode.core import LivebodeError, counted
+from livebode.doctor.arrival import check_arrival
 from livebode.doctor.check import Check
 from livebode.doctor.subject import Subject
 from livebode.locations import Location
@@ -53,7 +54,7 @@ _AT_ONCE = 16
 
 
 def check_sources(axes: Mapping[str, Axis]) -> list[Check]:
-    """A check for each axis; a single one where there is none. At most a connection is opened, and closed again."""
+    """A check for each axis; a single one where there is none. A live source that can be reached is listened to."""
     if not axes:
         return [Check(SOURCE, "not applicable", "there is no valid configuration of an axis that still runs")]
     with ThreadPoolExecutor(_AT_ONCE, "livebode doctor") as threads:
@@ -69,7 +70,10 @@ def _check(of: str, axis: Axis) -> Check:
         if settings.url is None:
             checks = [check_recording(name, axis, path) for path in settings.logs]
             return next((check for check in checks if check.verdict != "ok"), checks[0])
-        reach = make_source(settings).reach()
+        source = make_source(settings)
+        reach = source.reach()
+        if reach.verdict == "ok" and source.address.host:
+            return check_arrival(name, axis, reach)
         return Check(name, reach.verdict, reach.message, reach.remedy, reach.facts)
     except LivebodeError as error:
         return Check.of_error(name, error)

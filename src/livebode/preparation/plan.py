@@ -8,8 +8,8 @@ from typing import Protocol
 import numpy as np
 
 from livebode.configuration import Axis
-from livebode.core import ANY_EXCITATION, Block, ConfigError, Event, Lines, LivebodeError
-from livebode.estimation import FORGETTING, RippleOrder, Settings
+from livebode.core import ANY_EXCITATION, Block, Channel, ConfigError, Event, Lines, LivebodeError
+from livebode.estimation import FORGETTING, RippleOrder, Settings, default_hop, divisors
 from livebode.language import Message
 from livebode.preparation.checks import check_length
 from livebode.preparation.roles import ROLES, check_distinct, check_roles
@@ -79,6 +79,39 @@ def _difference(samples: np.ndarray, lag: int, ahead: int) -> float:
     return float(np.dot(rest, rest)) / (rest.size * power) if rest.size and power > 0 else 0.0
 
 
+RECORDED_VALUES_MAX = 1 << 19
+"""Responses × lines that a recording has by default, about 30 MB of its run."""
+
+
+def recorded_hop(axis: Axis, log: Log, lines: Lines) -> int | None:
+    """Hop of a recording so long that a twentieth of the window would give more than `RECORDED_VALUES_MAX`; else None.
+
+    It divides the window, and is the window at most, so that every sample counts. A machine that moves, or whose
+    changes are timed, has the usual hop.
+    """
+    timed = axis.signals.schedule or axis.motion or axis.monitoring.baseline or axis.signals.ready
+    if axis.tracking.hop or timed or log.samples is None:
+        return None
+    least = log.samples * len(lines) / RECORDED_VALUES_MAX
+    if least <= default_hop(lines.window):
+        return None
+    return next((hop for hop in divisors(lines.window) if hop >= least), lines.window)
+
+
+def hop_event(axis: Axis, log: Log, settings: Settings) -> list[Event]:
+    """An event if the hop is that of a long recording."""
+    usual = default_hop(settings.lines.window)
+    if settings.step != recorded_hop(axis, log, settings.lines):
+        return []
+    message = Message(
+        "the recording is long: it has a response every {hop} samples, so that the run is small; --hop {usual} gives "
+        "the usual number",
+        hop=settings.step,
+        usual=usual,
+    )
+    return [Event("long-recording", 0, 0.0, message)]
+
+
 SEARCHED = 1 << 22
 """Samples that "auto" and `inspect` use: half an hour at 2 kHz, and 100 MB of work."""
 _ROLES_SAMPLES, _ROLES_WINDOWS = 1 << 17, 32  # to judge the roles, whichever is longer
@@ -91,6 +124,27 @@ class RecordedSource(Protocol):
     def first(self) -> int: ...
 
     def blocks(self, channels: Sequence[str] | None = None) -> Iterator[Block]: ...
+
+
+class Recorded(RecordedSource, Protocol):
+    """Samples that can be read again: a Log, or what a live source sent."""
+
+    @property
+    def path(self) -> object: ...
+
+    @property
+    def format(self) -> str: ...
+
+    @property
+    def channels(self) -> tuple[Channel, ...]: ...
+
+    @property
+    def rate_hz(self) -> float: ...
+
+    @property
+    def samples(self) -> int | None: ...
+
+    def naming(self, names: Sequence[str]) -> Recorded: ...
 
 
 def window_in_doubt(axis: Axis, log: Log, settings: Settings) -> list[Event]:
@@ -186,7 +240,7 @@ def make_lines(axis: Axis, log: Log) -> Lines:
     return Lines.parse(frequencies, log.rate_hz, recognise(samples, log.rate_hz, doubtful=True).period)
 
 
-def beginning(log: Log, channel: str, samples: int = SEARCHED) -> np.ndarray:
+def beginning(log: RecordedSource, channel: str, samples: int = SEARCHED) -> np.ndarray:
     """The first samples of a channel, from `log.first` on, with NaN where some are missing."""
     return np.asarray(beginnings(log, [channel], samples)[0])
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import time
 from collections import deque
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from threading import Timer
 from typing import Any, Protocol, cast
@@ -237,7 +237,7 @@ def channel_names(paths: Sequence[str]) -> dict[str, str]:
     }
 
 
-def unusable_words(messages: Sequence[tuple[float, bytes]], trouble: object) -> str:
+def unusable_words(messages: Collection[tuple[float, bytes]], trouble: object) -> str:
     """What is wrong with the newest message, and its first bytes.
 
     >>> unusable_words([(0.0, b"12;34\\n")], "a message is not JSON")
@@ -245,7 +245,7 @@ def unusable_words(messages: Sequence[tuple[float, bytes]], trouble: object) -> 
     """
     if not messages:
         return str(trouble)
-    newest = messages[-1][1]
+    newest = list(messages)[-1][1]
     more = "…" if len(newest) > _BYTES_SHOWN else ""
     return f"{trouble}; the newest has {len(newest)} bytes and begins with {newest[:_BYTES_SHOWN]!r}{more}"
 

@@ -116,6 +116,8 @@ class LiveSource(ABC):
         self._settled, self._taken_delivery = SettledDeliveries(), 0
         self.has_record = self.asks_commit = False
         self.backlog_cause = BacklogCause()
+        self.senders: set[str] = set()
+        """Hosts of those who sent, where any may (UDP)."""
         self.retains_unusable = False
         self.unusable: deque[tuple[float, bytes]] = deque(maxlen=UNUSABLE_MAX)
         """When each of the newest messages that cannot be used came, by `time.monotonic`, and its bytes."""
@@ -161,6 +163,11 @@ class LiveSource(ABC):
     def spectra(self) -> SpectraLayout | None:
         """Layout of its spectra, if the drive sends spectra; None if it sends samples."""
         return self._sequencer.schema.spectra
+
+    @property
+    def trouble(self) -> str:
+        """Why no samples came last."""
+        return str(self._trouble)
 
     @property
     def samples(self) -> int | None:

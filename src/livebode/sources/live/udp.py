@@ -17,6 +17,7 @@ from livebode.sources.live.reach import Reach
 from livebode.sources.live.settings import SourceSettings
 from livebode.sources.live.source import LiveSource
 
+_SENDERS_MAX = 16
 _CHECK_S = 1.0
 """Interval of checks of a port that failed."""
 BUFFER_BYTES = 4 << 20
@@ -69,6 +70,8 @@ class UdpSource(LiveSource):
 
     def _take_datagram(self, datagram: bytes, host: str) -> None:
         sender = self._sender
+        if len(self.senders) < _SENDERS_MAX:
+            self.senders.add(host)
         if sender is not None and (other := plain_address(host)) != sender:
             self._events.report(
                 "foreign",

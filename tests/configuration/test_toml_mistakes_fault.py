@@ -1,0 +1,80 @@
+"""Mistakes that people make in TOML are answered with the line that they meant, which works when it is written."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from livebode.configuration import parse_table
+from livebode.core import ConfigError
+from tests.support.command import livebode
+
+HEAD = "# my axis\n[source]\nrate_hz = 4000\n"
+MISTAKES = [
+    (r'log = "C:\data\log.csv"', r"log = 'C:\data\log.csv'"),
+    (r'log = "C:\Users\me\log.csv"', r"log = 'C:\Users\me\log.csv'"),
+    ("output = velocity", 'output = "velocity"'),
+    ("output = Actual speed  # of the motor", 'output = "Actual speed" # of the motor'),
+    ("output: velocity", 'output = "velocity"'),
+    ('output: "velocity"', 'output = "velocity"'),
+    ("window: 400", "window = 400"),
+    ("forgetting = 0,8", "forgetting = 0.8"),
+    ("forgetting = 0,8 # of a period", "forgetting = 0.8 # of a period"),
+    ("average = True", "average = true"),
+    ("frequencies = 20:140:20", 'frequencies = "20:140:20"'),
+    ("output = “velocity”", 'output = "velocity"'),
+    ("output = „velocity“", 'output = "velocity"'),
+    ('output = "velocity', 'output = "velocity"'),
+    ("; the motor", "# the motor"),
+    ("// the motor", "# the motor"),
+    ("[signals", "[signals]"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("wrong", "meant"), MISTAKES, ids=[wrong for wrong, _ in MISTAKES])
+@pytest.mark.parametrize("end", ["\n", "\r\n"])
+def test_the_line_that_was_meant_is_given_and_works(wrong: str, meant: str, end: str) -> None:
+    text = f"{HEAD}{wrong}\nclock = 'utc'\n".replace("\n", end)
+    with pytest.raises(ConfigError) as caught:
+        parse_table(text.encode(), "axis.toml")
+    error = caught.value
+    assert (error.code, error.facts["line"]) == ("config.not-toml", 4)
+    assert f"in line 4: {wrong}" in error.message
+    assert error.remedy.startswith(f"write {meant}")
+    parse_table(text.replace(wrong, meant).encode(), "axis.toml")
+
+
+@pytest.mark.parametrize(
+    ("written", "meant"),
+    [(r"C:\temp\bode.csv", r"C:\temp\bode.csv"), (r"\fileserver\bode.csv", r"\fileserver\bode.csv")],
+)
+def test_a_path_whose_backslashes_are_read_as_special_letters_is_given_as_it_was_written(
+    written: str, meant: str
+) -> None:
+    with pytest.raises(ConfigError) as caught:
+        parse_table(f'[source]\nlog = "{written}"\n'.encode(), "axis.toml")
+    assert caught.value.remedy == f"write '{meant}' in single quotes, or {meant.replace(chr(92), '/')}"
+    assert parse_table(f"[source]\nlog = '{meant}'\n".encode(), "axis.toml")["source"]["log"] == meant
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16"])
+def test_a_file_of_an_editor_of_windows_is_read(encoding: str) -> None:
+    text = "# Vorschub in µm\r\n[signals]\r\n\toutput = 'Größe'\t# Ist\r\n"
+    assert parse_table(text.encode(encoding), "axis.toml") == {"signals": {"output": "Größe"}}
+
+
+def test_a_letter_of_another_encoding_is_named_with_its_line() -> None:
+    with pytest.raises(ConfigError) as caught:
+        parse_table("[signals]\noutput = 'Istgröße'\n".encode("cp1252"), "axis.toml")
+    assert "is not UTF-8 in line 2: output = 'Istgröße'" in caught.value.message
+    assert "UTF-8" in caught.value.remedy
+    with pytest.raises(ConfigError, match="is not text; give a configuration in TOML"):
+        parse_table(b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR\xff", "axis.toml")
+
+
+def test_in_the_terminal_it_is_one_sentence(tmp_path: Path) -> None:
+    (tmp_path / "axis.toml").write_text('[source]\nlog = "C:\\data\\log.csv"\n')
+    result = livebode("run", tmp_path / "axis.toml")
+    assert (result.code, result.err.count("\n")) == (2, 1)
+    assert r"write log = 'C:\data\log.csv' or log = 'C:/data/log.csv'" in result.err
