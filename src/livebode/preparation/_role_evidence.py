@@ -170,7 +170,7 @@ def _in_bands(x: Floats, y: Floats, rate_hz: float) -> tuple[Floats, Complex, Fl
     of_x, of_y = (np.add.reduceat(np.abs(z) ** 2, starts)[:-1] for z in (of_input, of_output))
     density = of_x / np.diff(starts)
     coherence = np.where(density > _POWER * density.max(), np.abs(cross) ** 2 / (of_x * of_y), 0.0)
-    return f, cross / of_x, coherence, int(np.diff(starts).min())
+    return f, np.asarray(cross / of_x, np.complex128), coherence, int(np.diff(starts).min())
 
 
 def _repeating(samples: Floats, rate_hz: float) -> tuple[Lines | None, bool]:
