@@ -32,6 +32,7 @@ from livebode.language import QUANTITY_NAMES
 from livebode.monitoring import ALARMS, RETURNS, UNMONITORED
 from livebode.monitoring.sensitivity import DIRECTIONS
 from livebode.runtime.run_counts import CAUSES
+from livebode_start.tasks import texts as texts_of_tasks
 
 ROOT = Path(__file__).parents[1]
 FOLDER = ROOT / "src/livebode/language/catalogues"
@@ -76,8 +77,9 @@ def extracted() -> dict[Key, set[str]]:
 
 
 def _names() -> set[str]:
-    """Names that are data: of quantities, parameters, margins and alarms."""
+    """What is data: names of quantities, parameters, margins and alarms; the help of what the tasks ask for."""
     found = {*QUANTITIES, *QUANTITY_NAMES, *DIRECTIONS, *ALARMS, *RETURNS, *UNMONITORED, *CAUSES, *DOUBTS, *VALUES}
+    found |= texts_of_tasks()
     for model in map(model_named, MODELS):
         extended = ExtendedModel(model, (LAG, RESIDUAL, MODE), 100.0)
         found |= {name.replace("_", " ") for name in (*extended.names, *model.derived_names)}

@@ -59,6 +59,14 @@ def dashboard_dark(studio: Studio) -> bytes:
 
 
 @scene
+def start_page(studio: Studio) -> bytes:
+    page = studio.page(studio.start_url, "measure?recording=standstill.csv", until=ANY)
+    page.wait_for_selector("#measure:enabled")
+    page.wait_for_timeout(1500)
+    return picture(page)
+
+
+@scene
 def live(studio: Studio) -> bytes:
     return picture(studio.page(studio.live_url))
 

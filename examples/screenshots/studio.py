@@ -18,6 +18,7 @@ from playwright.sync_api import Browser, Page, sync_playwright
 from examples.screenshots.machines import Afterwards, Tracked, at_standstill, healthy, write_gantry, write_loop
 from livebode.core import Lines
 from livebode.dashboard import Dashboard, ServerSettings
+from livebode.interface import write_examples
 from livebode.monitoring import Baseline
 from livebode.runtime import ClockSet, Destination, demo, demo_baseline
 from livebode.runtime._demo import RATE_HZ, demo_settings
@@ -90,6 +91,15 @@ class Studio(ExitStack):
         held, settings = at_standstill(lines, amplitude_n_m)
         with Tracked(held, settings, self.folder / name):
             return self.folder / name
+
+    @cached_property
+    def start_url(self) -> str:
+        """A directory with a recording and without runs."""
+        directory = self.folder / "runs"
+        write_examples(["standstill"], directory)
+        dashboard = Dashboard(ServerSettings("127.0.0.1", 0))
+        dashboard.view_all(directory)
+        return self.enter_context(dashboard).url
 
     @cached_property
     def faulty_url(self) -> str:

@@ -48,12 +48,12 @@ def test_an_input_that_no_channel_can_be_is_asked_for_among_the_channels(tmp_pat
     assert "the input channel is not recognised among w, y; give --input CHANNEL" in refused.err
 
 
-def test_a_comparison_without_a_fit_says_why_it_has_no_parameters(log: Path) -> None:
+def test_a_comparison_of_three_lines_says_why_it_has_no_parameters(log: Path) -> None:
     run = log.with_name("before")
     assert livebode("run", log, *ROLES, "--average", "--out", run).code == 0
     compared = livebode("compare", run, run)
     assert compared.code == 0
-    assert "neither run has a [fit] section (`livebode inspect --out axis.toml --fit auto` writes one)" in compared.out
+    assert "No parameters: the fit to before was rejected" in compared.out
     refused = livebode("learn", run, "--out", log.with_name("healthy.json"))
     assert "learn from a run with tracking.average = false, or compare two averaged runs" in refused.err
 

@@ -167,10 +167,10 @@ def test_margins_within_the_band_are_marked_on_magnitude_and_phase(tab: Tab) -> 
     marks = tab.page.evaluate(
         """async () => {
           const { marginMarks } = await import("/static/fitted.js");
-          const one = (name, unit, v, s) => [name, { name, unit, t: [1], v: [v], s: [s], at: () => 0 }];
+          const one = (name, unit, v, s) => [name, { name, unit, shown: { t: 1, v, s, status: "ok" } }];
           return marginMarks(new Map([one("gain_margin", "dB", 8, 0.5), one("gain_margin_frequency", "Hz", 90, 1),
             one("phase_margin", "deg", 45, 2), one("phase_margin_frequency", "Hz", 30, 1),
-            one("delay_margin", "ms", 45 / 360 / 30 * 1000, 0.1), one("delay_margin_frequency", "Hz", 30, 1)]), NaN);
+            one("delay_margin", "ms", 45 / 360 / 30 * 1000, 0.1), one("delay_margin_frequency", "Hz", 30, 1)]));
         }"""
     )
     gain, phase = marks
@@ -405,7 +405,7 @@ def test_references_have_names_and_survive_another_quantity_and_a_reload(tab: Ta
     tab.page.keyboard.press("u")
     tab.page.keyboard.press("u")
     tab.until("!bode.curves.reference && !bode.operation")
-    tab.page.locator("#pause").click()  # the moment is in the address too
+    tab.js("timeline.newest()")  # the moment is in the address too
     tab.until("timeline.atS === null && bode.drawn.measured")
 
 
@@ -477,3 +477,68 @@ def test_the_scale_of_the_phase_does_not_follow_a_moment_of_noise(tab: Tab) -> N
     kinds, *ranges = tab.page.evaluate(script)
     assert kinds == [True, False, False], "a moment that a person chose is shown whole"
     assert ranges == [[0, 1], [0, 1], [2, 3]]
+
+
+_WORDS_ON_DATA = """() => {
+  const { bode } = livebode, found = [];
+  for (const u of bode.charts.slice(0, 2)) {
+    const index = bode.charts.indexOf(u), boxes = [], { ctx } = u, fill = ctx.fillText, rect = ctx.fillRect;
+    ctx.fillRect = function (x, y, w, h) { boxes.push([x, y, w, h]); return rect.call(this, x, y, w, h); };
+    ctx.fillText = function (text, ...at) {
+      const box = boxes.at(-1);
+      if (/margin|gain may/.test(text) && box) found.push([text, index, ...box]);
+      return fill.call(this, text, ...at);
+    };
+    u.redraw(false, false);
+  }
+  return new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => {
+    const hit = found.filter(([, index, x, y, w, h]) => {
+      const u = bode.charts[index];
+      return ["measured", "model"].some((name) => {
+        const k = bode.seriesOf(index, name);
+        return Array.from(u.data[0]).some((hz, i) => {
+          const v = u.data[k][i];
+          if (!Number.isFinite(v)) return false;
+          const [a, b] = [u.valToPos(hz, "x", true), u.valToPos(v, "y", true)];
+          return a > x && a < x + w && b > y && b < y + h;
+        });
+      });
+    });
+    done([found.map(([text]) => text), hit.map(([text]) => text)]);
+  })));
+}"""
+
+
+def test_words_of_margins_are_never_on_the_curves(tab: Tab) -> None:
+    show(tab, "open loop")
+    tab.settle()
+    drawn_words, on_data = tab.page.evaluate(_WORDS_ON_DATA)
+    assert len(drawn_words) >= 2
+    assert on_data == []
+    below = tab.page.locator("#margin-words").inner_text()
+    assert all(word in below for word in ("gain margin", "phase margin", "delay margin"))
+    tab.page.set_viewport_size({"width": 390, "height": 844})
+    try:
+        tab.settle()
+        assert tab.page.evaluate(_WORDS_ON_DATA)[0] == [], "on a phone they are below the plot only"
+        assert tab.page.locator("#margin-words").is_visible()
+    finally:
+        tab.page.set_viewport_size({"width": 1440, "height": 900})
+        tab.settle()
+
+
+def test_on_a_phone_the_plot_is_first_and_its_tools_are_folded(browser: Browser, served: Dashboard) -> None:
+    with Tab(browser, served.url, viewport={"width": 390, "height": 844}) as phone:
+        phone.settle()
+        page = phone.page
+        top = page.locator("#magnitude").bounding_box()
+        assert top
+        assert top["y"] < 300, "above the middle of the first screen"
+        for hidden, fold in (("#download", "Menu"), ("#bode-view", "Tools"), ("#what-if", "Tools")):
+            assert page.locator(hidden).is_hidden()
+            page.get_by_role("button", name=fold, exact=True).click()
+            assert page.locator(hidden).is_visible()
+            page.get_by_role("button", name=fold, exact=True).click()
+            assert page.locator(hidden).is_hidden()
+        assert page.evaluate("document.documentElement.scrollWidth") <= 390
+        assert phone.wrong == []

@@ -106,8 +106,9 @@ def test_view_asks_for_the_token_of_the_file_that_it_is_given(tmp_path: Path) ->
         assert not urllib.request.urlopen(known).url.endswith("/login")
 
 
-def test_view_of_a_directory_without_a_run_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    result = livebode("view", tmp_path)
+def test_view_of_a_file_or_without_what_serves_it_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "servo.csv").write_text("t,y\n0,1\n")
+    result = livebode("view", tmp_path / "servo.csv")
     assert (result.code, result.err.count("\n")) == (2, 1)
     assert "not the directory of a run" in result.err
     (tmp_path / "axis.toml").write_text(

@@ -17,6 +17,7 @@ from livebode.configuration import LoopSection
 from livebode.core import CIRCLE_FACTOR, Block, Event, Lines, Responses, ServerError, widened
 from livebode.dashboard import Hub, Past, Quantities
 from livebode.dashboard.alarm_requests import acknowledgement
+from livebode.dashboard.board import verdict
 from livebode.dashboard.frames import KINDS, frame
 from livebode.dashboard.hub import EVENTS_MAX, ITEMS_MAX, VALUES_MAX
 from livebode.dashboard.notices import CAUSES_MAX, EventCauses, event_id
@@ -26,7 +27,7 @@ from livebode.dashboard.state import State
 from livebode.runtime import ClockSet, RunControl, RunEnded, RunStarted, TrackerResults
 from livebode.simulation.two_mass_loop import RATE_HZ
 from livebode.sources.live import LiveBlock
-from tests.support.dashboards import LINES, LOOP, Watched
+from tests.support.dashboards import LINES, LOOP, Watched, begin
 from tests.support.errors import refused
 from tests.support.responses import any_responses, made
 
@@ -200,9 +201,30 @@ def test_a_trend_is_evenly_thinned_however_it_came(sizes: list[int]) -> None:
     assert len(set(np.diff(kept.time_s))) <= 1
     assert kept.time_s[0] == 0
     assert np.array_equal(kept.value[:, 1], 3 * kept.time_s)
-    assert [(one["name"], one["value"]) for one in trend.plain(whole=False)] == [
+    assert trend.newest is not None
+    assert [(one["name"], one["value"]) for one in trend.plain(trend.newest)] == [
         ("Js", [2.0 * (at - 1)]), ("mL", [3.0 * (at - 1)]),
     ]  # fmt: skip
+
+
+@pytest.mark.parametrize("by_person", [False, True])
+def test_a_run_that_is_being_completed_is_not_silent(tmp_path: Path, by_person: bool) -> None:
+    """While pictures are drawn at the end, no samples come, and nobody has to look."""
+    hub = Hub("axis")
+    state = State("axis", 0, hub)
+    begin(hub, tmp_path, LINES)
+    total = None if by_person else 800
+    hub(TrackerResults(Block(np.zeros((1, 400)), ("u",), RATE_HZ, start=0), 400, total))
+    hub.followed_s -= 60
+    state.refresh()
+    assert (state.silence()[1], verdict(state).word) == (True, "silent")
+    if by_person:
+        assert hub.control is not None
+        hub.control.end()
+    else:
+        hub(TrackerResults(Block(np.zeros((1, 400)), ("u",), RATE_HZ, start=400), 800, total))
+    hub.followed_s -= 60
+    assert (state.silence()[1], verdict(state).word, state.health()["ending"]) == (False, "no-baseline", True)
 
 
 def test_notices_are_bounded_and_known_again() -> None:

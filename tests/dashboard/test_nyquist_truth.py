@@ -213,3 +213,44 @@ def test_a_reload_keeps_the_plot_and_its_neighbourhood_of_minus_one(tab: Tab) ->
     assert x0 <= -2.5 < 0.5 <= x1
     assert y0 <= -1.5 < 1.5 <= y1
     assert tab.page.locator("#bode-title").inner_text() == "Nyquist plot"
+
+
+def test_the_model_between_its_points_is_the_model(tab: Tab) -> None:
+    """A resonance with 1.8 % damping: the curve between the points of the page's grid differs by less than 0.01 %."""
+    lines = np.arange(4.0, 200.0, 3.0)
+    hz = np.union1d(np.geomspace(lines[0], lines[-1], 240), lines)
+
+    def plant(f: np.ndarray) -> np.ndarray:
+        s = 2j * np.pi * f
+        two = 180.0 + 0.014 * s
+        return np.asarray((0.0025 * s**2 + two) / (s * (0.0012 * 0.0025 * s**2 + (0.0012 + 0.0025) * two)))
+
+    value = plant(hz)
+    db, deg = 20 * np.log10(np.abs(value)), np.degrees(np.unwrap(np.angle(value)))
+    arguments = [hz.tolist(), db.tolist(), deg.tolist()]
+    for quick in (True, False):
+        x, y = np.array(
+            tab.page.evaluate(
+                "async ([hz, db, deg, round]) => { const { smooth } = await import('/static/smooth.js');"
+                " const { x, y } = smooth(hz, db, deg, round); return [x, y]; }",
+                [*arguments, quick],
+            )
+        )
+        found = x + 1j * y if quick else 10 ** (y / 20) * np.exp(1j * np.radians(x))
+        dense = np.interp(np.arange(len(found)) / 8, np.arange(len(hz)), np.log(hz))
+        truth = plant(np.exp(dense))
+        assert np.max(np.abs(found - truth) / np.abs(truth)) < 1e-4
+        assert np.allclose(found[::8], value)
+
+
+def test_measured_points_are_joined_only_where_there_is_no_model(tab: Tab) -> None:
+    show(tab, "nyquist")
+    paths = "Object.fromEntries(bode.plane.traced.map((t) => [t.name, t.path && t.path.x.length]))"
+    found = tab.js(paths)
+    assert found["measured"] is None
+    assert found["model"] == 8 * (len(tab.numbers("bode.grid")) - 1) + 1
+    tab.page.locator("#legend [data-name=model]").click()
+    tab.until("bode.plane.traced.every((t) => t.name !== 'model')")
+    assert tab.js(paths)["measured"] == len(LINES)
+    tab.page.locator("#legend [data-name=model]").click()
+    tab.until("bode.plane.traced.some((t) => t.name === 'model')")

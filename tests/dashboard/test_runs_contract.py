@@ -18,7 +18,7 @@ import pytest
 from starlette.applications import Starlette
 
 from livebode.core import RecordError, ServerError
-from livebode.dashboard import Dashboard, ServerSettings
+from livebode.dashboard import Dashboard, ServerSettings, plugin_pages
 from livebode.dashboard.access import Access
 from livebode.dashboard.run_catalogue import RunCatalogue
 from livebode.dashboard.runs_pages import OPEN_MAX, OpenedRuns
@@ -340,7 +340,10 @@ def test_hostile_notes_are_not_followed_and_not_believed(source: Path, tmp_path:
     assert found["pipe"]["state"] == "broken"
 
 
-def test_a_directory_without_runs_is_refused_by_the_command(tmp_path: Path) -> None:
+def test_a_directory_without_runs_is_refused_without_a_plug_in_that_measures(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     (tmp_path / "empty").mkdir()
+    monkeypatch.setattr(plugin_pages, "named", lambda _: {})
     found = livebode("view", tmp_path)
     assert (found.code, "no directory in it has one" in found.err) == (2, True)

@@ -251,12 +251,10 @@ def pinch(tab: Tab, box: dict[str, float]) -> None:
     assert tab.js("page.zoom[1] - page.zoom[0]") == pytest.approx(before / 3, rel=0.05)
 
 
-def test_what_a_run_does_not_have_is_disabled_with_the_reason(tab: Tab) -> None:
+def test_what_a_run_does_not_have_is_absent_and_an_address_that_asks_for_it_gets_the_reason(tab: Tab) -> None:
     show(tab, "axis=autumn&over=position")
-    button = tab.page.locator("#tracking-over [data-value=position]")
-    assert button.get_attribute("aria-disabled") == "true"
+    assert tab.page.locator("#tracking-over button").count() == 0
     assert tab.js("tracking.over") == "time"
-    button.dispatch_event("click")
     assert "name its channel as schedule" in notice(tab)
     tab.page.locator("#axis").select_option("2")
     tab.until("page.facts.name === 'run' && bode.curves.measured?.frame.axis === 2")
@@ -371,7 +369,7 @@ def test_a_printed_page_has_whole_curves_inside_its_margins(
     blue = np.flatnonzero((magnitude[..., :3] == MEASURED).all(axis=-1).any(axis=0))
     assert np.ptp(blue) > 0.85 * magnitude.shape[1], "from the first to the last line, in the colours of light"
     text = "".join(page.extract_text() for page in pages)
-    for words in ("run · livebode", "Not assessed", "phase margin", "a sample is not", "13 lines", "2.95 s"):
+    for words in ("run · livebode", "not monitored", "phase margin", "a sample is not", "13 lines", "2.95 s"):
         assert words in text
     for words in ("Download", "Freeze", "alarms only"):
         assert words not in text

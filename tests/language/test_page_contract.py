@@ -64,7 +64,7 @@ def test_the_page_has_no_english_outside_of_its_catalogue(browser: Browser, tmp_
             found = set()
             for name in ("map", "parameters", "margins"):
                 tab.page.locator(f"#tab-{name}").click()
-                tab.until("!page.dirty.has('trends')")
+                tab.settle()
                 data = {"livebode", "axis", "English", "Keff", "Enter", "Shift"}
                 found |= untranslated(tab.page.evaluate(_TEXTS), data)
             assert found == set()

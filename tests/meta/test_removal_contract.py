@@ -29,7 +29,7 @@ WRITING_MODULES = {
         "livebode_control/strokes/angle_table", "livebode_design/files", "livebode_design/matrix/matrix_files",
         "livebode_drives/plc_command",
         "livebode_plant/cli/archive/trend_command", "livebode_plant/lake/lake",
-        "livebode_reports/files", "livebode_reports/pdf", "tables/parquet_writer",
+        "livebode_reports/files", "livebode_reports/pdf", "livebode_start/uploads", "tables/parquet_writer",
     ),
     _NEW: (
         "interface/example_recordings", "livebode_design/experiment_design",

@@ -58,7 +58,7 @@ def test_names_that_a_person_gave_are_shown_with_their_units(tmp_path, names, ch
     for element, name in zip(given["rec"]["Y"][0, 0][0], names):
         element["Name"], element["Unit"] = name, ""
     scipy.io.savemat(tmp_path / "rec.mat", given)
-    log = open_log(tmp_path / "rec.mat")
+    log = open_log(tmp_path / "rec.mat").as_written()
     assert [(c.name, c.source_unit) for c in log.channels][1:] == channels
     for at, name in enumerate(names, start=1):
         for other in filter(None, [name, f"rec.Y({at}).Data", channels[at - 1][0]]):

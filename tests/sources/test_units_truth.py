@@ -175,6 +175,20 @@ def test_the_same_machine_in_the_units_of_any_drive_has_the_same_parameters(
     assert values(found) == pytest.approx(in_si, rel=1e-6)
 
 
+def test_a_linear_motor_has_masses_in_kilograms(tmp_path: Path, in_si: dict[str, float]) -> None:
+    """The same numbers with a force in N and a speed in mm/s."""
+    export = Export(T, ("w [N]", 1), ("Kraft [N]", 1), ("v [mm/s]", 1e3))
+    found = fitted(tmp_path / "run", export.write(tmp_path / "log.csv"), export.names, {})
+    rows = {name: (value, unit) for name, value, _, unit in found.rows()}
+    assert rows["Js"] == (pytest.approx(in_si["Js"], rel=1e-6), "kg")
+    assert rows["mL"] == (pytest.approx(in_si["JL"], rel=1e-6), "kg")
+    assert rows["Keff"] == (pytest.approx(in_si["Keff"], rel=1e-6), "N/m")
+    turned = Export(T, ("w [N]", 1), ("Kraft [N]", 1), ("n [rpm]", RPM))
+    gain = fitted(tmp_path / "gain", turned.write(tmp_path / "turned.csv"), turned.names, {})
+    assert gain.rows()[0][3] == "rad/s²/N"
+    assert any("'Kraft' is in N; a force drives masses only if the output is in m or m/s" in one for one in REMARKS)
+
+
 def test_counts_of_an_encoder_give_the_machine_within_their_steps(tmp_path: Path) -> None:
     export = Export(
         T, ("exc_Nm", 1), ("torque_Nm", 1), ("position_counts", COUNTS), {"position_counts": "1/1048576 rev"}, True
@@ -224,7 +238,8 @@ def test_a_gain_that_is_not_known_has_its_own_unit_and_the_remedy_that_is_named_
     assert found.asked is not None
     assert found.asked.name == "two-mass-gain"
     (_, value, _, shown), *others = found.rows()
-    assert (shown, value) == (unit, pytest.approx(gain, rel=2e-3))
+    assert shown == unit
+    assert value == pytest.approx(gain, rel=2e-3)
     assert {row[0]: row[1] for row in others}["resonance"] == pytest.approx(RESONANCE_HZ, rel=1e-3)
     (remark,) = (one for one in REMARKS if "the gain is unknown" in one)
     remedy = tomllib.loads(remark.partition("as in ")[2])
@@ -268,11 +283,11 @@ def test_an_expression_computes_with_si_units_and_its_own_unit_is_converted(tmp_
 def test_a_live_source_is_converted_as_a_recording_is(tmp_path: Path) -> None:
     """Lines of a sender, a table that grows, and a directory of recordings."""
     export = EXPORTS["% of the rated torque"]
-    declared = {"units": dict(export.units)}
+    units = dict(export.units)
     (tmp_path / "folder").mkdir()
     path = export.write(tmp_path / "folder" / "log.csv")
     names = list(export.names)
-    expected = np.concatenate([block.data for block in open_log(path, **declared).blocks(names)], axis=1)
+    expected = np.concatenate([block.data for block in open_log(path, units=units).blocks(names)], axis=1)
     np.testing.assert_allclose(expected, [servo()[name] for name in "wuy"], atol=1e-9)
 
     def read(settings: SourceSettings) -> Floats:
@@ -286,14 +301,14 @@ def test_a_live_source_is_converted_as_a_recording_is(tmp_path: Path) -> None:
         return np.concatenate(data, axis=1)
 
     for place in (path, tmp_path / "folder"):
-        np.testing.assert_array_equal(read(SourceSettings(log=place, follow=True, **declared)), expected)
+        np.testing.assert_array_equal(read(SourceSettings(log=place, follow=True, units=units)), expected)
     channels = tuple(Channel(c.name, c.source_unit) for c in open_log(path).channels[1:])
     raw = np.concatenate([block.data for block in open_log(path).as_written().blocks(names)], axis=1)
     (tmp_path / "lines").write_bytes(
         b"".join(encode_line(Batch(at, raw[:, at : at + 500], channels, RATE_HZ)) for at in range(0, raw.shape[1], 500))
     )
     with (tmp_path / "lines").open("rb") as lines, mock.patch.object(sys, "stdin", lines):
-        np.testing.assert_allclose(read(SourceSettings(url="stdin:", **declared)), expected, rtol=1e-9, atol=1e-12)
+        np.testing.assert_allclose(read(SourceSettings(url="stdin:", units=units)), expected, rtol=1e-9, atol=1e-12)
 
 
 def test_samples_that_were_recorded_in_si_units_are_replayed_as_they_are(tmp_path: Path) -> None:
@@ -319,7 +334,7 @@ def test_spectra_of_a_drive_are_converted_with_what_they_are_of() -> None:
     layout = SpectraLayout(
         (Channel("u", "%"), Channel("y", "rpm")), (Channel("x", "mm"),), 100, 20, (2, 5), (), (3.0, 60.0)
     )
-    sums = np.arange(8.0).reshape(2, 2, 2) + 1j
+    sums = np.asarray(np.arange(8.0).reshape(2, 2, 2) + 1j, dtype=np.complex128)
     batch = SpectraBatch(0, sums, np.array([[5.0, 7.0]]), np.zeros(2, dtype=np.uint32), layout, 1000.0)
     found = batch.in_si(Quantities(units={"u": "0.024 N m"}))
     assert [channel.unit for channel in found.channels] == ["N m", "rad/s", "m"]
@@ -342,6 +357,30 @@ def test_spectra_of_a_drive_are_converted_with_what_they_are_of() -> None:
 )  # fmt: skip
 def test_a_name_gives_kind_and_unit_only_if_it_says_so(name: str, kind: str | None, unit: str) -> None:
     assert (kind_by_name(name), unit_by_name(name)) == (kind, unit)
+
+
+@pytest.mark.parametrize(
+    ("head", "encoding"),
+    [
+        ("Zeit;Sollmoment;Istdrehzahl;Lage\n[s];[Nm];[1/min];[°]", "cp1252"),
+        ("Zeit;Sollmoment;Istdrehzahl;Lage\ns;Nm;U/min;Grad", "utf-8"),
+        ("t/s;M/Nm;n/min-1;phi/Grad", "utf-8"),
+        ("t in s;M in Nm;n in 1/min;phi in °", "latin-1"),
+        ("Time(s);Torque(Nm);Speed(rpm);Position(deg)", "utf-8"),
+        ("Time, s;Torque, N·m;Speed, rpm;Position, deg", "cp1252"),
+        ("时间(秒);转矩(N·m);转速(转/分);位置(度)", "gb18030"),
+        ("t_s;TorqueNm;MotorSpeedRPM;pos_deg", "utf-8"),
+    ],
+)
+def test_units_are_found_wherever_a_drive_writes_them(head: str, encoding: str, tmp_path: Path) -> None:
+    rows = "".join(f"{i / 1000:.3f};{i % 7};{i % 5};{i * i % 11}\n" for i in range(50)).replace(".", ",")
+    path = tmp_path / "log.csv"
+    path.write_bytes(f"{head}\n{rows}".encode(encoding))
+    log = open_log(path)
+    assert log.rate_hz == 1000
+    assert [(channel.unit, channel.factor) for channel in log.channels[1:]] == [
+        ("N m", 1.0), ("rad/s", pytest.approx(pi / 30)), ("rad", pytest.approx(pi / 180)),
+    ]  # fmt: skip
 
 
 @pytest.mark.parametrize("unit", ["0.024 foo", "0 N m", "1/0 rev", "1e400 N m", "-2 N m"])

@@ -111,12 +111,17 @@ class Tab:
         )
 
     def settle(self) -> None:
-        """Wait until the read-out is drawn, which has rows or none, and each chart has the size that this leaves it."""
-        self.until("!page.dirty.has('read') && !page.dirty.has('bode')")
+        """Wait until all that is due now is drawn, and each chart has the size that this leaves it.
+
+        The read-out has rows or none, so that it changes the size of the charts above it.
+        """
+        for _ in range(2):  # what is drawn may make other parts due
+            now_ms = self.page.evaluate("() => performance.now()")
+            self.until(f"[...page.dirty].every((part) => page.last[part] > {now_ms})")
         self.page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
         self.until(
             "bode.charts.every(({root: {parentElement: host}, width, height}) =>"
-            " width === host.clientWidth && height === host.clientHeight)"
+            " !host.clientWidth || (width === host.clientWidth && height === host.clientHeight))"
         )
 
     def js(self, expression: str) -> Any:

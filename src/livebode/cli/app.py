@@ -203,6 +203,8 @@ def run_application() -> None:
     except Exception as error:
         _fail(error)
     else:
+        if code == 130:  # Ctrl-C in a command: Typer has made an exit of it
+            _stop("livebode: stopped; no file is half written", code)
         sys.exit(code)
 
 

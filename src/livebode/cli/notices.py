@@ -13,7 +13,7 @@ _KINDS = {
     "roles-doubtful", "transient", "outlying-periods", "phase-slip", "phase-slips", "restart", "replaced",
     "computer-clock", "foreign", "backlog", "backlog-cleared", "waiting", "window-doubtful",
     "drift", "not-periodic", "distortion-levels", "best-linear-approximation", "recordings-differ",
-    "uneven-clock", "suppressed", "sink-down", "sink-up", "sink-full", "sink-refused",
+    "uneven-clock", "long-recording", "suppressed", "sink-down", "sink-up", "sink-full", "sink-refused",
 }  # fmt: skip
 _ONCE = {"foreign", "suppressed"}
 _PERCENT_EVERY_S = 0.2
@@ -38,7 +38,7 @@ class NoticePrinter:
 
 
 class PercentPrinter:
-    """A subscriber that prints how far a run is, for a program that reads it: a line for each percent, a few a second."""
+    """A subscriber that prints how far a run is, for a program that reads it: a line for a percent, a few a second."""
 
     def __init__(self) -> None:
         self._percent, self._printed_s = -1, float("-inf")

@@ -197,7 +197,7 @@ class TrackingSection(ConfigurationSection):
         controllers in [loop]; without them, their action in the recorded signals, which "direct" cannot.
     hop
         Samples between responses. Default: for a recording a twentieth of the window, for a live source 20 responses
-        per second; the nearest divisor of the window.
+        per second; the nearest divisor of the window. A long recording at standstill has fewer: about 500,000 values.
     average
         Average over the previous periods, weighted by forgetting, instead of using only the newest window.
     forgetting

@@ -31,6 +31,9 @@ def rounded_down(value: float) -> float:
     return near if near <= value else float(f"{value * (1 - 5e-4):.4g}")
 
 
+_PLACES_MAX = 6
+
+
 def with_bound(value: float, bound: float) -> tuple[str, str]:
     """Value and bound, rounded to two significant digits of the bound.
 
@@ -45,4 +48,6 @@ def with_bound(value: float, bound: float) -> tuple[str, str]:
     if abs(value) >= 1e7 or digits > 9:
         return number(value, ".5g"), number(bound, ".2g")
     places = f".{max(digits, 0)}f"
-    return number(round(value, digits), places), number(round(bound, digits), places)
+    # A row of zeros is not legible.
+    half = number(bound, ".2g") if digits > _PLACES_MAX else number(round(bound, digits), places)
+    return number(round(value, digits), places), half

@@ -45,11 +45,14 @@ class Finding:
 
 @dataclass(frozen=True)
 class Answer:
-    """A quantity that was measured, its value with bound and unit, and the result of its limit, if it has one."""
+    """A quantity that was measured: its value or change with bound and unit, and the result.
+
+    `beside` is its limit, or the values before and after.
+    """
 
     name: str
     value: str
-    limit: str = ""
+    beside: str = ""
     tone: Tone | None = None
 
 

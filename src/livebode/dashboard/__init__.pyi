@@ -27,4 +27,5 @@ from livebode.dashboard.plugin_pages import WorkspacePages as WorkspacePages
 from livebode.dashboard.quantities import Quantities as Quantities
 from livebode.dashboard.queries import json_object as json_object
 from livebode.dashboard.queries import moment as moment
+from livebode.dashboard.run_catalogue import runs_in as runs_in
 from livebode.dashboard.server_settings import ServerSettings as ServerSettings

@@ -189,7 +189,7 @@ class _Pages:
             return _unknown()
         span = queries.span(request.query_params, len(self._board.states))
         response = await self._board.elsewhere(Past.of(state).at, span.from_s)
-        data = state.frames_of("moment", response, span.quantity)
+        data = state.frames_at(response, span.quantity)
         return Response(data, media_type="application/octet-stream")
 
     async def signals(self, request: Request) -> Response:

@@ -106,7 +106,7 @@ def _of_alarm(
 def _silence(axis: State) -> AxisVerdict | None:
     """The source does not send, or tracking is behind; None if all is well, or the axis is a record."""
     hub = axis.hub
-    if hub is None or axis.finished or axis.notices.shelf(SOURCE) is not None:
+    if hub is None or axis.finished or hub.ending or axis.notices.shelf(SOURCE) is not None:
         return None
     silent_s, stale = axis.silence()
     health = hub.health

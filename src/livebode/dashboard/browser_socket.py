@@ -138,7 +138,8 @@ class Client(BrowserSocket):
             self._watched, self._restart = asked, True
         elif asked.kind in ("pause", "resume"):
             self._paused = asked.kind == "pause"
-            self._sent.pop("newest", None)
+            for name in ("newest", "fits", "fit_at"):
+                self._sent.pop(name, None)
         elif asked.kind == "unfreeze":
             for slot in [asked.slot] if asked.slot else list(self._references):
                 self._references.pop(slot, None)
@@ -209,6 +210,9 @@ class Client(BrowserSocket):
         if not self._paused and self._sent.get("newest") != state.version:
             self._sent["newest"] = state.version
             frames += state.newest_frames(quantity)
+        if not self._paused and self._sent.get("fits") != state.trends.version and self._due("fit", TRENDS_EVERY_S):
+            self._sent["fits"] = state.trends.version
+            frames += state.newest_fits(quantity)
         for slot, reference in list(self._references.items()):
             if not state.quantities.fit(reference):
                 del self._references[slot]  # it belongs to a previous run

@@ -13,6 +13,9 @@
 | then | f32 × rows × columns, each | magnitude in dB, phase in degrees, reach, reach of the noise alone, coherence |
 | end | | zeros up to a multiple of 8 bytes, where the next frame may begin |
 
+Of the kind `fits` there is only JSON after the head, as many bytes as there are rows: one row of every parameter, those
+of the fit whose model follows in the same message.
+
 Numbers are little endian, in row order. `reach` is bound/|value|, with the radius of 95 %: the edges of the band are
 magnitude + 20·log10(1 ± reach) and phase ± arcsin(reach), undefined for reach ≥ 1. The reach of the noise alone leaves
 out what repeats with the excitation (friction, backlash, encoder steps), and is unknown where that is unknown. Unknown
@@ -29,10 +32,11 @@ import numpy as np
 from livebode.core import CIRCLE_FACTOR, Quantity, Responses, widened
 from livebode.dashboard.quantities import QUANTITIES
 from livebode.pictures import unwrapped
+from livebode.records import to_json
 
 REFERENCES_MAX = 8
 KINDS = (
-    *("newest", "moment", "reference", "baseline", "model", "rows", "history"),
+    *("newest", "moment", "reference", "baseline", "model", "rows", "history", "fits"),
     *(f"reference {slot}" for slot in range(2, REFERENCES_MAX + 1)),
 )
 _HEADER = struct.Struct("<4sBBBBII")
@@ -73,6 +77,13 @@ def curve(kind: str, axis: int, quantity: Quantity, time_s: float, value: np.nda
     unknown = np.array([np.nan])
     head = header(kind, axis, quantity, 1, len(value))
     return _packed(head, (np.array([time_s]), unknown, unknown), (magnitude, phase, nothing, nothing, nothing))
+
+
+def fits(axis: int, quantity: Quantity, plain: list[dict[str, Any]]) -> bytes:
+    """A frame of one row of every parameter."""
+    text = to_json(plain).encode()
+    data = header("fits", axis, quantity, len(text), 0) + text
+    return data + bytes(-len(data) % 8)
 
 
 def header(kind: str, axis: int, quantity: Quantity, rows: int, columns: int) -> bytes:

@@ -12,7 +12,17 @@ from typing import Any
 from livebode.analysis import Overview
 from livebode.core import Block, Event, Parameters, Responses
 from livebode.dashboard.signal_tap import SignalTap
-from livebode.runtime import Channels, ClockSet, Document, FitResults, RunControl, RunEnded, RunStarted, TrackerResults
+from livebode.runtime import (
+    Channels,
+    ClockSet,
+    Document,
+    FitResults,
+    RunControl,
+    RunEnded,
+    RunStarted,
+    RunStep,
+    TrackerResults,
+)
 from livebode.sources.live import Health, LiveBlock
 
 Item = Responses | tuple[Parameters, ...] | Event
@@ -40,6 +50,7 @@ class Hub:
         self.ended: Mapping[str, Any] | None = None
         self.overview: Overview | None = None
         self.samples = self.gaps = self.given_up = 0
+        self._complete = False
         self.intervals_s: deque[float] = deque(maxlen=_INTERVALS)
         self.followed_s = 0.0
         """`time.monotonic()` of the newest samples, or of the start of the run."""
@@ -75,8 +86,15 @@ class Hub:
                 self.signals.begin(used, (self.begun or {}).get("found", {}).get("window", 0))
             case ClockSet(pieces):
                 self.clock = pieces
+            case RunStep("ending"):
+                self._complete = True
             case RunEnded(summary):
                 self.ended = summary
+
+    @property
+    def ending(self) -> bool:
+        """Whether no more samples follow: the source is at its end, or a person ended the run; pictures are drawn."""
+        return self._complete or (self.control is not None and self.control.ended)
 
     def record(self, event: Event) -> bool:
         """Record an event of a person; False if the run has ended or too many are waiting."""
@@ -87,6 +105,7 @@ class Hub:
             self._rows, self._values = deque(), 0
         self.directory, self.control, self.overview = started.directory, started.control, started.overview
         self.ended = None
+        self._complete = False
         self.followed_s, self.clock = time.monotonic(), ()
         self.intervals_s.clear()
         self.begun = started.summary

@@ -14,7 +14,6 @@ from livebode.arrays import Floats
 from livebode.configuration import FitSection, chosen_model, recorded_configuration
 from livebode.core import Lines, LivebodeError, Quantity, Responses
 from livebode.dashboard.quantities import Quantities
-from livebode.dashboard.recent import Trends
 from livebode.estimates import MATRIX, rule
 from livebode.fitting import EvaluationGrid, PhysicalModel
 from livebode.language import Message
@@ -37,7 +36,6 @@ class FittedCurve:
     def __init__(self, quantities: Quantities, section: FitSection) -> None:
         self._quantities = quantities
         self.model: PhysicalModel = chosen_model(section, quantities.kinds)
-        self._newest: tuple[float, Floats] | None = None
         self._grid = EvaluationGrid(grid_hz(quantities.lines), quantities.lines.rate_hz, section.hold)
 
     @classmethod
@@ -48,35 +46,17 @@ class FittedCurve:
             return None
         return cls(quantities, FitSection.model_validate(words))
 
-    def curve(self, trends: Trends, quantity: Quantity, time_s: float | None) -> tuple[float, Any] | None:
-        """Time and values on the grid of the newest valid fit, or of the valid fit nearest to a time."""
-        fitted = self._parameters(trends, time_s)
-        if fitted is None:
-            return None
-        at_s, values = fitted
+    def curve(self, values: Floats, quantity: Quantity) -> Any:
+        """Values on the grid, for these parameters of the model."""
         plant = self.model.at(values, self._grid)
         if quantity == "plant":
-            return at_s, plant
-        return at_s, self._quantities.converted(plant, quantity, self._feedback)[0]
+            return plant
+        return self._quantities.converted(plant, quantity, self._feedback)[0]
 
     @cached_property
     def _feedback(self) -> Any:
         assert self._quantities.loop is not None
         return self._quantities.loop.feedback_at(self._grid.frequency_hz)
-
-    def _parameters(self, trends: Trends, time_s: float | None) -> tuple[float, Floats] | None:
-        """Time and values of one valid fit."""
-        values_of_time = trends.values(self.model.name, self.model.names, whole=time_s is not None)
-        if values_of_time is None:
-            return None
-        at_s, values = values_of_time
-        good = np.flatnonzero(np.isfinite(values).all(axis=1))
-        if time_s is not None and good.size:
-            nearest = good[np.argmin(np.abs(at_s[good] - time_s))]
-            return float(at_s[nearest]), values[nearest]
-        if time_s is None and good.size:
-            self._newest = float(at_s[-1]), values[-1]
-        return self._newest if time_s is None else None
 
 
 class Healthy:

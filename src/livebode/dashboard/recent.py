@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import nan
 from typing import Any
 
 import numpy as np
@@ -87,6 +88,7 @@ class RecentResponses:
 POINTS_MAX = 1024
 TRENDS_MAX = 256
 _TREND_PARTS_MAX = 16
+_TAIL = 64  # newest rows that are all retained: the newest of a batch may be rejected, and one before it shown
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,6 +108,7 @@ class ModelTrend:
     def __init__(self, model: str, names: Sequence[str], units: Sequence[str]) -> None:
         self.model, self.names, self.units = model, tuple(names), tuple(units)
         self.newest: TrendRows | None = None
+        self._tail: TrendRows | None = None
         self._rows: list[TrendRows] = []
         self._seen, self._stride, self._kept = 0, 1, 0
 
@@ -114,6 +117,7 @@ class ModelTrend:
         if not len(rows):
             return
         self.newest = rows[-1:]
+        self._tail = TrendRows.join([rows] if self._tail is None else [self._tail, rows])[-_TAIL:]
         self._keep(rows[-self._seen % self._stride :: self._stride])
         self._seen += len(rows)
         while self._kept > POINTS_MAX:
@@ -128,10 +132,12 @@ class ModelTrend:
             self._rows = [TrendRows.join(self._rows)]
         return self._rows[0]
 
-    def plain(self, *, whole: bool) -> list[dict[str, Any]]:
-        """Plain data for the page, one item for each parameter: all retained rows, or only the newest."""
-        rows = self.rows() if whole else self.newest
-        assert rows is not None
+    def known(self) -> TrendRows:
+        """The retained rows, and all of the newest; some are in both."""
+        return self.rows() if self._tail is None else TrendRows.join([self.rows(), self._tail])
+
+    def plain(self, rows: TrendRows) -> list[dict[str, Any]]:
+        """Rows as plain data for the page, one item for each parameter."""
         shared = {name: getattr(rows, name).tolist() for name in ("time_s", "schedule", "status")}
         return [
             {"model": self.model, "name": name, "unit": unit, "value": value.tolist(), "sigma": sigma.tolist()} | shared
@@ -171,22 +177,71 @@ class Trends:
         self._trends[key].add(rows)
         self.version += 1
 
-    def values(self, model: str, names: Sequence[str], *, whole: bool) -> tuple[Floats, Floats] | None:
-        """Times, and values (rows, names), of all retained rows or of the newest; None if a name or row is missing."""
+    def moment(self, time_s: float, model: str, names: Sequence[str]) -> FitMoment:
+        """What is shown of a time: the nearest valid fit of a model, and of every other trend the row of that fit.
+
+        Trends without a row of that time have their nearest row with a value. `time_s` may be infinite: the newest.
+        """
+        known = [(trend, trend.known()) for trend in self._trends.values() if trend.newest is not None]
+        time_s = min(time_s, max((float(rows.time_s[-1]) for _, rows in known), default=nan))
         columns = {
             name: (rows.time_s, rows.value[:, column])
-            for trend in self._trends.values()
-            if trend.model == model and trend.newest is not None
-            for rows in [trend.rows() if whole else trend.newest]
+            for trend, rows in known
+            if trend.model == model
             for column, name in enumerate(trend.names)
         }
         chosen = [columns[name] for name in names if name in columns]
-        if len(chosen) < len(names) or any(len(time_s) != len(chosen[0][0]) for time_s, _ in chosen):
-            return None
-        return chosen[0][0], np.stack([value for _, value in chosen], axis=1)
+        fit_s, values = nan, None
+        if chosen and len(chosen) == len(names) and all(len(times) == len(chosen[0][0]) for times, _ in chosen):
+            of_names = np.stack([value for _, value in chosen], axis=1)
+            row = _nearest(chosen[0][0], np.asarray(np.isfinite(of_names).all(axis=1)), time_s)
+            if row is not None:
+                fit_s, values = float(chosen[0][0][row]), of_names[row]
+        plain = [item for trend, rows in known for item in trend.plain(_row(rows, fit_s, time_s))]
+        return FitMoment(fit_s, values, plain)
 
     def plain(self, *, whole: bool) -> list[dict[str, Any]]:
-        """Plain data for the page; see `ModelTrend.plain`."""
+        """Plain data for the page, one item for each parameter: all retained rows, or only the newest."""
+        rows = [(trend, trend.rows() if whole else trend.newest) for trend in self._trends.values()]
         return [
-            item for trend in self._trends.values() if trend.newest is not None for item in trend.plain(whole=whole)
+            item for trend, some in rows if some is not None and trend.newest is not None for item in trend.plain(some)
         ]
+
+
+@dataclass(frozen=True, eq=False)
+class FitMoment:
+    """Rows of the trends of a run that are shown together.
+
+    Attributes
+    ----------
+    time_s
+        Effective time of the fit of the drawn model; NaN if there is none.
+    values
+        Parameters of this fit; None if there is none.
+    plain
+        One row of every parameter, as plain data for the page.
+    """
+
+    time_s: float
+    values: Floats | None
+    plain: list[dict[str, Any]]
+
+
+def _row(rows: TrendRows, fit_s: float, time_s: float) -> TrendRows:
+    """The row of a fit; else the row with a value that is nearest to it, or to a time; else the nearest row."""
+    same = np.flatnonzero(rows.time_s == fit_s)
+    if same.size:
+        row = int(same[-1])
+        return rows[row : row + 1]
+    near_s = time_s if np.isnan(fit_s) else fit_s
+    known = np.asarray(np.isfinite(rows.value).any(axis=1))
+    row = _nearest(rows.time_s, known | ~known.any(), near_s) or 0
+    return rows[row : row + 1]
+
+
+def _nearest(times_s: Floats, use: NDArray[np.bool_], time_s: float) -> int | None:
+    """Index of the row in use that is nearest to a time, of equal ones the last; None if none is in use."""
+    rows = np.flatnonzero(use)[::-1]
+    if not rows.size:
+        return None
+    return int(rows[np.argmin(np.abs(times_s[rows] - time_s))])

@@ -5,10 +5,11 @@ from __future__ import annotations
 import json
 import time
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import asdict
 from importlib.metadata import version
+from math import inf
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -20,7 +21,7 @@ from livebode.configuration import recorded_configuration
 from livebode.core import Event, LivebodeError, Quantity, Responses, RunClock
 from livebode.dashboard.alarm import AlarmShelf
 from livebode.dashboard.alarm_requests import shelving, unshelving
-from livebode.dashboard.frames import curve, frame
+from livebode.dashboard.frames import curve, fits, frame
 from livebode.dashboard.hub import Hub, Item
 from livebode.dashboard.matrix_group import MatrixGroup
 from livebode.dashboard.notices import EventCauses
@@ -61,7 +62,6 @@ class State:
         self._healthy: Healthy | HealthyEntry | None = None
         self._remark = ""
         self._grew = float("-inf")
-        self._made: dict[tuple[str, Quantity, float], bytes] = {}
 
     def _empty(self) -> None:
         self.newest: Responses | None = None
@@ -74,6 +74,7 @@ class State:
         self._seen = 0
         self._pace: deque[tuple[float, int]] = deque(maxlen=128)
         self.sent: deque[Responses] = deque(maxlen=_SENT)
+        self._made: dict[tuple[str, Quantity], tuple[int, bytes]] = {}  # frames for all browsers, by version
         self._ending: set[str] = set()  # causes whose unshelving waits to be recorded
 
     @property
@@ -213,32 +214,48 @@ class State:
         return quantity if quantity and not self.quantities.why_not(quantity) else self.quantities.own
 
     def newest_frames(self, quantity: Quantity) -> bytes:
-        """Frames of the newest response, the model and the healthy machine."""
-        assert self.quantities is not None
-        if self.newest is None:
+        """Frames of the newest response and the healthy machine, the same for all browsers."""
+        newest = self.newest
+        if newest is None:
             return b""
-        if not self.sent or self.sent[-1] is not self.newest:
-            self.sent.append(self.newest)
-        return self.frames_of("newest", self.newest, quantity, newest=True)
+        if not self.sent or self.sent[-1] is not newest:
+            self.sent.append(newest)
+        return self._once("newest", quantity, self.version, lambda: self._response_frames("newest", newest, quantity))
 
-    def frames_of(self, kind: str, response: Responses, quantity: Quantity, *, newest: bool = False) -> bytes:
-        """Frames of one response as `kind` and of its overlays; the newest is cached for other browsers."""
-        key = (kind, quantity, float(self.version))
-        if newest and key in self._made:
-            return self._made[key]
+    def newest_fits(self, quantity: Quantity) -> bytes:
+        """Frames of the newest valid fit, its parameters and its model, the same for all browsers."""
+        return self._once("fits", quantity, self.trends.version, lambda: self._fit_frames(inf, quantity))
+
+    def frames_at(self, response: Responses, quantity: Quantity) -> bytes:
+        """Frames of one response as `moment`, of the healthy machine, and of the nearest valid fit."""
+        return self._response_frames("moment", response, quantity) + self._fit_frames(
+            float(response.time_s[0]), quantity
+        )
+
+    def _once(self, kind: str, quantity: Quantity, version: int, make: Callable[[], bytes]) -> bytes:
+        known = self._made.get((kind, quantity))
+        if known is None or known[0] != version:
+            known = self._made[kind, quantity] = version, make()
+        return known[1]
+
+    def _response_frames(self, kind: str, response: Responses, quantity: Quantity) -> bytes:
         assert self.quantities is not None
-        parts = [frame(kind, self.axis, self.quantities.of_responses(response, quantity))]
-        moment = None if newest else float(response.time_s[0])
-        if self._fitted is not None and (fitted := self._fitted.curve(self.trends, quantity, moment)) is not None:
-            parts.append(curve("model", self.axis, quantity, *fitted))
-        if self._healthy is not None:
-            near = self._healthy.response(response, self._schedule_before(response))
-            if near is not None:
-                parts.append(frame("baseline", self.axis, self.quantities.of_responses(near, quantity)))
-        made = b"".join(parts)
-        if newest:
-            self._made = {k: v for k, v in self._made.items() if k[2] == key[2]} | {key: made}
-        return made
+        made = frame(kind, self.axis, self.quantities.of_responses(response, quantity))
+        if self._healthy is None:
+            return made
+        near = self._healthy.response(response, self._schedule_before(response))
+        return (
+            made if near is None else made + frame("baseline", self.axis, self.quantities.of_responses(near, quantity))
+        )
+
+    def _fit_frames(self, time_s: float, quantity: Quantity) -> bytes:
+        """The parameters of a moment, and the model that is drawn of them."""
+        model = None if self._fitted is None else self._fitted.model
+        moment = self.trends.moment(time_s, model.name if model else "", model.names if model else ())
+        made = fits(self.axis, quantity, moment.plain)
+        if self._fitted is None or moment.values is None:
+            return made
+        return made + curve("model", self.axis, quantity, moment.time_s, self._fitted.curve(moment.values, quantity))
 
     def rows(self, after: int, most: int) -> Responses | None:
         """The recent responses after the first `after`, at most the newest `most`."""
@@ -330,7 +347,7 @@ class State:
         delays = np.array(hub.delays_s) * 1e3
         health_facts |= {"samples": hub.samples, "gaps": hub.gaps, "given_up": hub.given_up}
         silent_s, stale = self.silence()
-        health_facts |= {"silent_s": silent_s, "stale": stale, "backlog_s": self.backlog_s()}
+        health_facts |= {"ending": hub.ending, "silent_s": silent_s, "stale": stale, "backlog_s": self.backlog_s()}
         if delays.size:
             health_facts |= {"behind_ms": float(np.median(delays)), "behind_p99_ms": float(np.quantile(delays, 0.99))}
         if (health := hub.health) is not None:
@@ -338,10 +355,10 @@ class State:
         return health_facts
 
     def silence(self) -> tuple[float, bool]:
-        """How long no samples have arrived, and whether that is longer than usual."""
+        """How long no samples have arrived, and whether that is longer than usual; not while the run is completed."""
         assert self.hub is not None
         silent_s, usual_s = time.monotonic() - self.hub.followed_s, median([*self.hub.intervals_s, 0.0])
-        return silent_s, silent_s > max(_SILENT_S, 3 * usual_s)
+        return silent_s, silent_s > max(_SILENT_S, 3 * usual_s) and not self.hub.ending
 
     def backlog_s(self) -> float | None:
         """How far tracking is behind the source, if that is more than a person expects."""

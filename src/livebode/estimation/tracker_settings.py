@@ -332,8 +332,16 @@ def nearest_hop(window: int, required: float) -> int:
     (200, 125, 100)
     """
     required = min(max(1.0, required), float(window))
-    small = [d for d in range(1, isqrt(window) + 1) if window % d == 0]
-    divisors = small + [window // d for d in small]
-    nearest = min(divisors, key=lambda d: max(d / required, required / d))
+    nearest = min(divisors(window), key=lambda d: max(d / required, required / d))
     # A prime window has no divisor nearby; a longer last step in each period is then better.
     return nearest if max(nearest / required, required / nearest) <= 4 else round(required)
+
+
+def divisors(window: int) -> list[int]:
+    """All divisors, ascending.
+
+    >>> divisors(12)
+    [1, 2, 3, 4, 6, 12]
+    """
+    small = [d for d in range(1, isqrt(window) + 1) if window % d == 0]
+    return sorted({*small, *(window // d for d in small)})

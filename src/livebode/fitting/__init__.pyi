@@ -23,6 +23,7 @@ from livebode.fitting.mean import mean_response as mean_response
 from livebode.fitting.mean import with_drift as with_drift
 from livebode.fitting.mean_of_recordings import RecordingScatter as RecordingScatter
 from livebode.fitting.mean_of_recordings import RecordingsMean as RecordingsMean
+from livebode.fitting.models import MODELS as MODELS
 from livebode.fitting.models import model_named as model_named
 from livebode.fitting.once import Fit as Fit
 from livebode.fitting.once import best_of as best_of

@@ -345,7 +345,7 @@ def _phrase(item: dict[str, Any]) -> Message:
         return Message("magnitude at {line} {amount:+.1f} ± {bound:.1f} %", line=name, **facts)
     if item["of"] == "phase":
         return Message("phase at {line} {amount:+.1f} ± {bound:.1f} °", line=name, **facts)
-    part = name if isinstance(name, Message) else Message(name)
+    part = name if isinstance(name, Message) else Message(name.replace("_", " "))
     if item["of"] == "value":
         return Message("{part} {amount:+.1f} ± {bound:.1f} %", part=part, **facts)
     size = Message("{amount:.3g} ± {bound:.2g}", **facts)

@@ -9,7 +9,7 @@ import numpy as np
 
 from livebode.configuration import Axis
 from livebode.core import ANY_EXCITATION, Block, Channel, ConfigError, Event, Lines, LivebodeError
-from livebode.estimation import FORGETTING, RippleOrder, Settings
+from livebode.estimation import FORGETTING, RippleOrder, Settings, default_hop, divisors
 from livebode.language import Message
 from livebode.preparation.checks import check_length
 from livebode.preparation.roles import ROLES, check_distinct, check_roles
@@ -77,6 +77,39 @@ def _difference(samples: np.ndarray, lag: int, ahead: int) -> float:
     rest = rest[np.isfinite(rest)]
     power = float(np.nanvar(samples))
     return float(np.dot(rest, rest)) / (rest.size * power) if rest.size and power > 0 else 0.0
+
+
+RECORDED_VALUES_MAX = 1 << 19
+"""Responses × lines that a recording has by default, about 30 MB of its run."""
+
+
+def recorded_hop(axis: Axis, log: Log, lines: Lines) -> int | None:
+    """Hop of a recording so long that a twentieth of the window would give more than `RECORDED_VALUES_MAX`; else None.
+
+    It divides the window, and is the window at most, so that every sample counts. A machine that moves, or whose
+    changes are timed, has the usual hop.
+    """
+    timed = axis.signals.schedule or axis.motion or axis.monitoring.baseline or axis.signals.ready
+    if axis.tracking.hop or timed or log.samples is None:
+        return None
+    least = log.samples * len(lines) / RECORDED_VALUES_MAX
+    if least <= default_hop(lines.window):
+        return None
+    return next((hop for hop in divisors(lines.window) if hop >= least), lines.window)
+
+
+def hop_event(axis: Axis, log: Log, settings: Settings) -> list[Event]:
+    """An event if the hop is that of a long recording."""
+    usual = default_hop(settings.lines.window)
+    if settings.step != recorded_hop(axis, log, settings.lines):
+        return []
+    message = Message(
+        "the recording is long: it has a response every {hop} samples, so that the run is small; --hop {usual} gives "
+        "the usual number",
+        hop=settings.step,
+        usual=usual,
+    )
+    return [Event("long-recording", 0, 0.0, message)]
 
 
 SEARCHED = 1 << 22

@@ -13,6 +13,7 @@ from livebode.runtime.documents import Document as Document
 from livebode.runtime.documents import FitResults as FitResults
 from livebode.runtime.documents import RunEnded as RunEnded
 from livebode.runtime.documents import RunStarted as RunStarted
+from livebode.runtime.documents import RunStep as RunStep
 from livebode.runtime.documents import Subscriber as Subscriber
 from livebode.runtime.documents import TrackerResults as TrackerResults
 from livebode.runtime.estimate import SEEN_AGAIN_BYTES as SEEN_AGAIN_BYTES
@@ -23,6 +24,7 @@ from livebode.runtime.estimate import RunContext as RunContext
 from livebode.runtime.estimate import check_channels as check_channels
 from livebode.runtime.feed import Feed as Feed
 from livebode.runtime.fits import Fits as Fits
+from livebode.runtime.in_memory import follow_recording as follow_recording
 from livebode.runtime.readiness import ENDED as ENDED
 from livebode.runtime.readiness import SUPPRESSED as SUPPRESSED
 from livebode.runtime.readiness import Readiness as Readiness

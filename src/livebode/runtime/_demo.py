@@ -22,7 +22,8 @@ RATE_HZ, WINDOW, HOP, LOSS = 4000.0, 800, 200, 0.1
 SECONDS_MIN = 16.0  # the alarm is raised in the second stroke after the loss
 LEARNED_S = 48.0
 _SPEEDS_M_PER_S = 0.38, 0.3  # learned at both: equal strokes would put the windows always at the same positions
-_AMPLITUDE_N_M = 0.5  # per line; 3 N m at the peaks
+_AMPLITUDE_N_M = (1.5, 0.8, *[0.5] * 19)  # of each line; 4 N m at the peaks
+"""More at the lowest lines: friction at the turning points of the strokes disturbs these most."""
 
 
 def check_seconds(seconds: float) -> None:

@@ -7,6 +7,7 @@ import time
 from livebode.configuration import NOT_RECORDED, Axis, open_recordings
 from livebode.core import RunClock, moments_by
 from livebode.estimates import rule
+from livebode.runtime.documents import RunStep
 from livebode.runtime.estimate import ExaminedRecording, Outcome
 from livebode.runtime.feed import Feed
 from livebode.runtime.recorder import Destination
@@ -35,6 +36,8 @@ def run(axis: Axis, to: Destination, control: RunControl | None = None) -> Outco
     """
     control, started = control or RunControl(), time.perf_counter()
     kind = axis.kind
+    if not axis.source.live:
+        to.announce(RunStep("opening"))
     named, logs = open_recordings(axis)
     if not logs:  # the source is live
         from livebode.runtime.live import run_live
@@ -45,5 +48,6 @@ def run(axis: Axis, to: Destination, control: RunControl | None = None) -> Outco
     about |= provenance(of.axis, of.digests)
     feed = Feed(of.source, control, noticed=of.noticed, recorded=of.recorded, started=started)
     loop = RunLoop(feed, of.estimate, to, about=about, segments=of.axis.record)
+    to.announce(RunStep("tracking"))
     with moments_by(RunClock.of_kind(of.clock)):
         return loop.run()

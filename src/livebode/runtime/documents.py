@@ -83,6 +83,20 @@ class TrackerResults:
     samples_total: int | None
 
 
+@dataclass(frozen=True)
+class RunStep:
+    """What the run does from now.
+
+    Attributes
+    ----------
+    name
+        "opening", "lines" (their search), "examining" and "tracking" of a recording; "ending" of every run: no samples
+        follow, and pictures are drawn.
+    """
+
+    name: str
+
+
 @dataclass(frozen=True, eq=False)
 class RunEnded:
     """The run ended; `summary` is the final run.json."""
@@ -91,7 +105,16 @@ class RunEnded:
 
 
 Document = (
-    RunStarted | Channels | ClockSet | Responses | MatrixResponses | FitResults | Event | TrackerResults | RunEnded
+    RunStarted
+    | Channels
+    | ClockSet
+    | Responses
+    | MatrixResponses
+    | FitResults
+    | Event
+    | TrackerResults
+    | RunStep
+    | RunEnded
 )
 """New `Responses`, of a matrix run `MatrixResponses` (when a run continues, first the newest previous ones), an
 `Event`, or one of the classes here."""

@@ -63,12 +63,7 @@ def _report_late(to: Destination, why: str) -> None:
         Message("{why}; the axis waits: switch the machine on, or check the address", why=why),
     )
     _logger.warning("%s", event.message)
-    _announce(to, event)
-
-
-def _announce(to: Destination, event: Event) -> None:
-    for subscriber in to.subscribers:
-        subscriber(event)
+    to.announce(event)
 
 
 class _Succession:
@@ -150,7 +145,7 @@ class _Succession:
                     loop.finish()
             except LivebodeError as error:
                 _logger.error("%s: %s", loop.to.directory, error)
-                _announce(self._to, Event("record-unfinished", *loop.position, error.words))
+                self._to.announce(Event("record-unfinished", *loop.position, error.words))
 
         thread = threading.Thread(target=finish, name="livebode finishing")
         thread.start()

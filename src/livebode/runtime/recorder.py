@@ -189,3 +189,8 @@ class Destination:
     record: Recorder | None = None
     prepare: Callable[[], None] = nothing
     findings: Callable[[], Mapping[str, Any]] = dict
+
+    def announce(self, document: Document) -> None:
+        """Pass a document to every subscriber, before or beside a run."""
+        for subscriber in self.subscribers:
+            subscriber(document)

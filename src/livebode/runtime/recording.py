@@ -17,6 +17,7 @@ from livebode.preparation import (
     ChannelCheck,
     configured_part,
     early_spikes,
+    hop_event,
     make_follower,
     make_settings,
     roles_in_doubt,
@@ -27,6 +28,7 @@ from livebode.preparation import (
     window_in_doubt,
 )
 from livebode.records import content_sha256
+from livebode.runtime.documents import RunStep
 from livebode.runtime.estimate import ExaminedRecording
 from livebode.runtime.recorder import Destination
 from livebode.runtime.single_response import SingleResponse
@@ -44,11 +46,17 @@ def examined_recordings(axis: Axis, logs: Sequence[Log], to: Destination) -> Exa
 
         return examined_uneven(axis, log)
     log = configured_part(axis, log)
-    follower = make_follower(axis, log)
+    to.announce(RunStep("lines"))
+    return examined_recording(axis, log, make_follower(axis, log), to)
+
+
+def examined_recording(axis: Axis, log: Log, follower: Follower, to: Destination) -> ExaminedRecording:
+    """A recording, examined as a whole, and tracked by this follower."""
     log = log.naming(axis.signals.named)
     estimate = SingleResponse.of(axis, follower, log.channels)
     log = log.naming(estimate.channels)  # with the covariates of a baseline
     to.prepare()
+    to.announce(RunStep("examining"))
     of, settings = examined(axis, log, follower), follower.settings
     if settings.quantity == "plant" and settings.periodic:
         estimate.drift = fitting.DriftTest(settings.lines)
@@ -68,7 +76,7 @@ def examined(axis: Axis, log: Log, follower: Follower, shift: int = 0) -> Examin
     """Examine a recording as a whole; the follower leaves out what does not fit, at the file's numbers plus `shift`."""
     settings = follower.settings
     noticed = [Event("roles-doubtful", 0, 0.0, message) for message in roles_in_doubt(axis, log, settings)]
-    noticed += window_in_doubt(axis, log, settings)
+    noticed += window_in_doubt(axis, log, settings) + hop_event(axis, log, settings)
     slips = slips_of(log, settings)
     if slips:
         noticed.append(slip_event(slips, settings))

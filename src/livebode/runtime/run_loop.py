@@ -14,7 +14,16 @@ from livebode.configuration import RecordSection
 from livebode.core import Block, Event, LivebodeError, SignalError
 from livebode.preparation import ChannelCheck, check_length
 from livebode.runtime.allocation import keep_freed_memory
-from livebode.runtime.documents import Channels, ClockSet, Document, RunEnded, RunStarted, Subscriber, TrackerResults
+from livebode.runtime.documents import (
+    Channels,
+    ClockSet,
+    Document,
+    RunEnded,
+    RunStarted,
+    RunStep,
+    Subscriber,
+    TrackerResults,
+)
 from livebode.runtime.estimate import Estimate, Outcome, RunContext
 from livebode.runtime.feed import Feed
 from livebode.runtime.recorder import Destination, WholeRecord
@@ -138,6 +147,7 @@ class RunLoop:
         """Process every Block until the source ends or another configuration follows; SignalError if there is none."""
         self._begin()
         self.feed.run(self._steps(), self._recorder)
+        self._stream.announce(RunStep("ending"))
         self._control.looked_s = None
         self._recorder.commit_last()
         if not self._counts.stop:

@@ -17,12 +17,14 @@ _NAMES: Mapping[QuantityKind, re.Pattern[str]] = {
     "acceleration": re.compile(r"acceler|beschleunig|加速度|(?<![a-z])acc(?![a-z])"),
     "torque": re.compile(r"torque|moment(?!a)|(?<![a-z])trq(?![a-z])|转矩|扭矩|力矩"),
     "velocity": re.compile(r"speed|velocit|drehzahl|geschwindigkeit|转速|(?<!加)速度|(?<![a-z])(?:vel|omega)(?![a-z])"),
-    "position": re.compile(r"position|angle|winkel|位置|角度|lage(?:ist|soll)|(?:ist|soll)lage|(?<![a-z])pos(?![a-z])"),
+    "position": re.compile(
+        r"position|angle|winkel|位置|角度|lage(?:ist|soll)|(?:(?<![a-z])|ist|soll)lage(?![a-z])|(?<![a-z])pos(?![a-z])"
+    ),
     "force": re.compile(r"force|(?<!t)kraft|推力"),
     "current": re.compile(r"strom|电流|(?<![a-z])i_?q(?![a-z])|(?<![a-z])current$"),
 }
 """Words of one kind of quantity, without capitals; "current" alone is also an adjective."""
-_WORDS = re.compile(r"[_\s.]+")
+_WORDS = re.compile(r"[_\s.]+|(?<=[a-z])(?=[A-Z][A-Za-z]+$)")
 _SUFFIXES: Mapping[str, str] = {
     "rpm": "rpm", "nm": "N m", "mnm": "mN m", "ncm": "N cm", "deg": "deg", "mdeg": "mdeg", "rad": "rad", "mrad": "mrad",
     "mm": "mm", "um": "um", "rev": "rev", "ma": "mA", "kn": "kN", "arms": "Arms", "pct": "%", "percent": "%",
@@ -48,7 +50,7 @@ def unit_by_name(name: str) -> str:
 
     A single letter is a unit only if the name says what it measures: `axis_A` is not a current.
 
-    >>> [unit_by_name(name) for name in ("speed_rpm", "torque_Nm", "velocity_rad_s", "iq_A", "axis_A", "load pct")]
+    >>> [unit_by_name(name) for name in ("speed_rpm", "TorqueNm", "velocity_rad_s", "iq_A", "axis_A", "load pct")]
     ['rpm', 'N m', 'rad/s', 'A', '', '%']
     """
     first, *words = _WORDS.split(name.strip())

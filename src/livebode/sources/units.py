@@ -20,12 +20,14 @@ SECONDS = {
     "ms": 1e-3, "msec": 1e-3, "milliseconds": 1e-3,
     "us": 1e-6, "µs": 1e-6, "μs": 1e-6, "usec": 1e-6, "microseconds": 1e-6,
     "ns": 1e-9, "nanoseconds": 1e-9,
-    "min": 60.0, "h": 3600.0,
+    "min": 60.0, "h": 3600.0, "秒": 1.0, "毫秒": 1e-3, "微秒": 1e-6,
 }  # fmt: skip
 """Length of each unit of time in seconds."""
 
 
-RELATIVE = frozenset(("%", "‰", "v", "mv", "counts", "count", "cts", "inc", "incr", "inkr", "inkremente", "lsb"))
+RELATIVE = frozenset(
+    ("%", "‰", "v", "mv", "counts", "count", "cts", "inc", "incr", "inkr", "inkremente", "lsb", "脉冲")
+)
 """Units without an SI value of their own; without capitals."""
 
 
@@ -90,12 +92,23 @@ def unbracketed(unit: str) -> str:
 def split_units(headings: Sequence[str]) -> list[tuple[str, str]]:
     """`split_unit` for each heading; if headings differ only by their unit, it remains in the name.
 
+    Units behind a stroke (DIN 1313) or a comma are units if those of all such headings are.
+
     >>> split_units(["t [s]", "x [m]", "x [inch]"])
     [('t', 's'), ('x [m]', 'm'), ('x [inch]', 'inch')]
+    >>> split_units(["t/s", "n / min-1", "on"]), split_units(["t, ms", "M, N·m"]), split_units(["x/A", "x/status"])
+    ([('t', 's'), ('n', 'min-1'), ('on', '')], [('t', 'ms'), ('M', 'N·m')], [('x/A', ''), ('x/status', '')])
     """
-    pairs = [split_unit(heading) for heading in headings]
+    pairs = _with_mark(headings, "/") or _with_mark(headings, ",") or [split_unit(heading) for heading in headings]
     count = Counter(name for name, _ in pairs)
     return [(name if count[name] == 1 else text, unit) for text, (name, unit) in zip(headings, pairs, strict=True)]
+
+
+def _with_mark(headings: Sequence[str], mark: str) -> list[tuple[str, str]]:
+    """Names and units of headings, several of which have a unit behind this mark; none if another has no unit there."""
+    pairs = [(name.strip(), unit.strip()) for name, _, unit in (heading.partition(mark) for heading in headings)]
+    marked = [unit for (_, unit), heading in zip(pairs, headings) if mark in heading]
+    return pairs if len(marked) > 1 and all(map(is_unit, marked)) else []
 
 
 def time_unit(name: str, unit: str) -> str:

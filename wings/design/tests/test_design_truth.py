@@ -12,7 +12,7 @@ import pytest
 from scipy.io import loadmat
 
 from livebode import Lines, open_log
-from livebode.core import LivebodeError
+from livebode.core import DesignError, LivebodeError
 from livebode.excitation import Waveform, multisine
 from livebode.records import RunRecord
 from livebode.simulation import SimulatedAxis
@@ -164,6 +164,21 @@ def test_npz_and_matlab_hold_every_bit_and_the_phases_of_equation_6(waveform, tm
         assert facts["seed"] == 7
         assert Lines(tuple(facts["bins"]), facts["window"], facts["rate_hz"]).bins == waveform.lines.bins
     assert struct["Ts"] == 1 / 4000
+
+
+def test_wav_is_read_back_as_a_recording_with_the_nearest_floats(waveform, tmp_path):
+    write(tmp_path / "w.wav", waveform, "w")
+    log = open_log(tmp_path / "w.wav")
+    assert log.rate_hz == 4000
+    (block,) = log.blocks(["c1"])
+    assert np.array_equal(block["c1"], waveform.samples.astype(np.float32))
+
+
+def test_a_rate_that_wav_does_not_have_is_refused(waveform, tmp_path):
+    lines = Lines(waveform.lines.bins, waveform.lines.window, 4000.5)
+    with pytest.raises(DesignError, match=r"4000\.5 Hz; choose another format"):
+        write(tmp_path / "w.wav", Waveform(lines, waveform.samples, {}), "w")
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("as_type", ["double", "float"])

@@ -122,7 +122,8 @@ def test_an_odrive_on_a_bus_with_errors_is_followed(tmp_path):
 
         with fed(peer, script) as source:
             assert [channel.name for channel in source.channels] == [CHANNELS[0], "Iq_Setpoint", "Vel_Estimate"]
-            assert [channel.unit for channel in source.channels] == ["N m", "A", "rev/s"]
+            assert [channel.source_unit for channel in source.channels] == ["N m", "A", "rev/s"]
+            factors = np.array([[channel.factor] for channel in source.channels])
             blocks = []
             for block in source.blocks():
                 blocks.append(block)
@@ -130,7 +131,7 @@ def test_an_odrive_on_a_bus_with_errors_is_followed(tmp_path):
                     break
             events = source.take_events()
     for block in blocks:
-        assert (block.data == block.data[0]).all()
+        np.testing.assert_allclose(block.data / factors, np.tile(block.data[:1], (3, 1)), rtol=1e-15)
         np.testing.assert_array_equal(np.diff(block.data[0]), 1)
     for a, b in pairwise(blocks):
         assert b.gap == (b.data[0, 0] != a.data[0, -1] + 1)

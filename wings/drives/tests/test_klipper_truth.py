@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 
-from livebode.core import Channel, ConfigError, SourceError
+from livebode.core import ConfigError, SourceError
 from livebode.sources.live import SourceSettings, make_source
 from livebode_drives.live.klipper import MOVES_MAX, WAIT_S, Moves
 from livebode_drives.live.on_grid import OnGrid
@@ -40,9 +40,10 @@ def test_the_response_is_that_of_the_printer(tmp_path):
             printer.run(30)
 
         with fed(printer, script) as source:
-            assert source.channels[0] == Channel("command_x", "mm/s^2")
+            assert (source.channels[0].unit, source.channels[0].source_unit) == ("m/s²", "mm/s^2")
             assert source.rate_hz == RATE_HZ
             time_s, data = until_s(source, 102.4)
+            data = 1e3 * data  # in mm/s²
             assert source.health.lost == 0
             assert [event.kind for event in source.take_events()] == ["connected"]
     np.testing.assert_allclose(np.diff(time_s), 1 / RATE_HZ)

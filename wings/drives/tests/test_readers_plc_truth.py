@@ -41,7 +41,11 @@ def test_every_dialect_of_twincat_scope_gives_names_units_and_time(tmp_path, del
     path = tmp_path / "scope.csv"
     write_scope(path, [group(1000, 300, pos=("mm", 2), vel=("", 3))], delimiter, decimal, end)
     log = open_log(path)
-    assert [(channel.name, channel.unit) for channel in log.channels] == [("t", "ms"), ("pos", "mm"), ("vel", "")]
+    assert [(channel.name, channel.source_unit) for channel in log.channels] == [
+        ("t", "ms"),
+        ("pos", "mm"),
+        ("vel", ""),
+    ]
     assert (log.rate_hz, log.samples, log.format) == (1000, 300, "twincat")
     for name in ("vel", "MAIN.vel"):
         np.testing.assert_array_equal(values(log, name), np.arange(300) / 1000 * 3)
@@ -52,7 +56,7 @@ def test_a_twincat_export_without_the_lines_of_its_file_is_read_alike(tmp_path):
     write_scope(path, [group(1000, 300, pos=("mm", 2))])
     path.write_text(path.read_text().partition("\n\n\n")[2])
     log = open_log(path)
-    assert [(channel.name, channel.unit) for channel in log.channels] == [("t", "ms"), ("pos", "mm")]
+    assert [(channel.name, channel.source_unit) for channel in log.channels] == [("t", "ms"), ("pos", "mm")]
     assert (log.rate_hz, log.samples) == (1000, 300)
 
 
@@ -81,10 +85,10 @@ def test_a_scope_project_gives_what_its_charts_show(tmp_path):
     path = tmp_path / "project.svdx"
     write_project(path, given, after_s=0.01)
     log = open_log(path)
-    assert [(c.name, c.unit) for c in log.channels] == [("MAIN.r", "mm"), ("MAIN.n", ""), ("hidden", "")]
+    assert [(c.name, c.source_unit) for c in log.channels] == [("MAIN.r", "mm"), ("MAIN.n", ""), ("hidden", "")]
     assert (log.rate_hz, log.samples, log.other_clocks) == (1000, 290, {"slow.t": ("slow",)})
     assert [skipped.name for skipped in log.skipped] == ["packed", "text", "bit"]
-    np.testing.assert_array_equal(values(log, "MAIN.r"), -10 * (2 * count[:290] / 8 + 1) + 10)
+    np.testing.assert_array_equal(values(log.as_written(), "MAIN.r"), -10 * (2 * count[:290] / 8 + 1) + 10)
     np.testing.assert_array_equal(values(log, "MAIN.n"), count[:290])
     np.testing.assert_array_equal(values(open_log(path, time="slow.t"), "slow"), np.arange(58))
 
@@ -116,7 +120,7 @@ def test_names_with_blanks_between_blanks_are_read_as_their_symbols(tmp_path):
     second = [f"      {k + 0.5} {k}" for k in range(100, 140)]  # a blank is an empty cell, too
     path.write_text("\n".join([*head, "", *first, *second]) + "\n")
     log = open_log(path)
-    assert [(c.name, c.unit) for c in log.channels] == [("t", "ms"), ("MAIN.x", "mm"), ("MAIN.x (2)", "")]
+    assert [(c.name, c.source_unit) for c in log.channels] == [("t", "ms"), ("MAIN.x", "mm"), ("MAIN.x (2)", "")]
     np.testing.assert_array_equal(values(log, "MAIN.x (2)"), 3 * np.arange(100))
     other = open_log(path, channels=["motor current"])
     assert (other.samples, other.channels[1].unit) == (140, "A")
@@ -138,7 +142,7 @@ def test_channels_of_other_sample_times_are_read_on_request(tmp_path):
     write_scope(path, [fast, slow])
     whole, other = open_log(path, channels=["pos"]), open_log(path, channels=["MAIN.current"])
     assert (whole.rate_hz, whole.samples, other.rate_hz, other.samples) == (1000, 300, 5000, 1500)
-    np.testing.assert_array_equal(values(whole, "pos"), np.arange(300) / 1000 * 2)
+    np.testing.assert_array_equal(values(whole.as_written(), "pos"), np.arange(300) / 1000 * 2)
     np.testing.assert_array_equal(values(other, "current"), np.arange(1500) / 5000 * 5)
     assert other.other_clocks == {"t": ("pos", "vel")}
     assert whole.other_clocks == {"current.t": ("current",)}
@@ -202,7 +206,7 @@ def test_a_labview_measurement_file_gives_names_units_and_rate(tmp_path, columns
     text = LVM.format(columns=columns, units=units) + "\n".join([header, *(line.replace(".", ",") for line in rows)])
     path.write_text(text + "\n", encoding="utf-8")
     log = open_log(path)
-    assert [(c.name, c.unit) for c in log.channels if c.name != "X_Value"] == [("speed", "rad/s"), ("iq", "A")]
+    assert [(c.name, c.source_unit) for c in log.channels if c.name != "X_Value"] == [("speed", "rad/s"), ("iq", "A")]
     assert (log.rate_hz, log.skipped) == (2000, ())
     np.testing.assert_array_equal(values(log, "iq"), np.arange(200) * 0.25)
 
@@ -241,7 +245,7 @@ def test_a_trace_of_codesys_3_gives_its_variables_with_their_clocks(tmp_path, fl
     }
     write_trace(path, variables, flags)
     log = open_log(path)
-    assert [(c.name, c.unit) for c in log.channels[1:]] == [("PLC_PRG.rPos", ""), ("PLC_PRG.bOn", "")]
+    assert [(c.name, c.source_unit) for c in log.channels[1:]] == [("PLC_PRG.rPos", ""), ("PLC_PRG.bOn", "")]
     assert (log.rate_hz, log.format, log.other_clocks) == (1000, "codesys", {"PLC_PRG.rTemp.t": ("PLC_PRG.rTemp",)})
     assert [skipped.name for skipped in log.skipped] == ["PLC_PRG.sState", "PLC_PRG.rNever"]
     np.testing.assert_array_equal(values(log, "PLC_PRG.rPos"), np.arange(300) * 0.5)

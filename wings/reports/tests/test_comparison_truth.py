@@ -89,13 +89,13 @@ def test_runs_of_another_direction_or_speed_are_reported(tmp_path: Path) -> None
     assert any("Only one of the runs has a changing schedule" in w for w in at_standstill.warnings)
 
 
-def test_a_stiffness_lost_halfway_is_the_change_of_the_fitted_parameter(tmp_path: Path) -> None:
-    """The belt axis as `run` writes it: 5 % less stiffness halfway is 5 % of Keff between the halves."""
+@pytest.mark.parametrize("fit", [{"model": "two-mass", "output": "velocity", "radius_m": 0.019}, None])
+def test_a_lost_stiffness_is_the_change_of_the_fitted_parameter(tmp_path: Path, fit: dict[str, object] | None) -> None:
+    """The belt axis as `run` writes it, also without a [fit]: 5 % less stiffness is 5 % of Keff."""
     from livebode.fitting import EvaluationGrid, TwoMass
 
     model = TwoMass(radius_m=0.019)
-    fit = {"model": "two-mass", "output": "velocity", "radius_m": 0.019}
-    configuration = {"signals": {"output": "y"}, "fit": fit}
+    configuration = {"signals": {"output": "y"}} | ({} if fit is None else {"fit": fit})
     paths = []
     for seed, stiffness in ((1, 5e5), (2, 4.75e5)):
         true = model.at(np.array([0.0028, 6.7, stiffness, 130.0, 0, 0, 0]), EvaluationGrid(LINES.frequency_hz, 4000.0))
@@ -106,11 +106,13 @@ def test_a_stiffness_lost_halfway_is_the_change_of_the_fitted_parameter(tmp_path
     assert done.code == 0, done.err
     table = {row["name"]: row for row in json.loads(done.out)["parameters"]}
     assert table["Keff"]["significant"]
-    assert abs(table["Keff"]["change"] + 0.25e5) < table["Keff"]["change_bound"]
-    for name in ("Js", "mL", "bs"):
+    loss = 0.05 * (5e5 if fit is not None else 5e5 * 0.019**2)  # without a radius in N m/rad
+    assert abs(table["Keff"]["change"] + loss) < table["Keff"]["change_bound"]
+    for name in ("Js", "mL" if fit is not None else "JL", "bs"):
         assert not table[name]["significant"], name
     printed = livebode("compare", *paths)
-    assert "Keff" in printed.out
+    assert printed.out.startswith("belt stiffness −")
+    assert "Keff" not in printed.out
     assert "changed" in printed.out
 
 

@@ -333,7 +333,7 @@ def test_before_and_after_draw_both_means_and_mark_what_differs(tmp_path: Path) 
     assert lines.headings[9] == "detectable %"
     seen = comparison.differences.overall.seen
     np.testing.assert_allclose([float(row[9]) for row in lines.rows], 100 * seen, rtol=0.05)
-    assert ("smallest detectable change", f"≥ {100 * seen.max():.2g} %") in document.facts
+    assert ("smallest detectable change of a line", f"≥ {100 * seen.max():.2g} %") in document.facts  # of all alike
     np.testing.assert_array_equal([line["detectable"] for line in comparison.plain()["lines"]], seen)
     assert done.out.split()[-2:] == [str(tmp_path / "both.html"), str(tmp_path / "both.pdf")]
     assert "lines of 7 differ" in Page((tmp_path / "both.html").read_text("utf-8")).text

@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -19,9 +20,9 @@ from livebode_start.jobs import RUNNING_MAX, Job, JobOrder, Jobs, file_name
 from tests.support.browser import until
 from tests.support.command import livebode, signals, write_csv
 
-DEMO = JobOrder("run", ("demo", "--seconds=600", "--out=demo"), ("demo",))
+DEMO = JobOrder("run", ("demo", "--seconds=600", "--out=demo"))
 """Ten minutes of a simulated axis, in real time."""
-LIVE = JobOrder("run", ("run", "axis.toml", "--out=live"), ("live",))
+LIVE = JobOrder("run", ("run", "axis.toml", "--out=live"))
 """A file that is followed: samples at once, and then none."""
 AXIS = """
 source = {log = "log.csv", follow = true, rate_hz = 1000}
@@ -83,6 +84,15 @@ def test_a_cancelled_live_run_is_complete(jobs: Jobs, tmp_path: Path) -> None:
     assert ended(job).state == "done", job.plain()
     assert job.code == 0
     assert has_responses(tmp_path / "live")
+
+
+@pytest.mark.parametrize("after_s", [0.0, 0.05, 0.2, 0.5, 1.0])
+def test_a_job_that_is_cancelled_while_it_starts_says_what_ctrl_c_would(jobs: Jobs, after_s: float) -> None:
+    job = jobs.start(DEMO)
+    time.sleep(after_s)
+    jobs.cancel(job.id)
+    assert ended(job).state == "stopped"
+    assert job.sentence in ("stopped; nothing was written", "stopped; no file is half written")
 
 
 def test_a_killed_job_says_so_and_another_one_can_start(jobs: Jobs) -> None:

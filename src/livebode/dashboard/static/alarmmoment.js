@@ -1,6 +1,6 @@
 // @ts-check
 // The moment of an alarm: the response at it, and as reference the one before the change began.
-import { framesOf } from "./frames.js";
+import { curveIn } from "./frames.js";
 import { tr } from "./language.js";
 import { ask, reason } from "./link.js";
 
@@ -54,8 +54,8 @@ export function alarmMoment(page, timeline, { references, complain }) {
     if (!(to > from)) return;
     const about = { axis: page.axis, quantity: page.quantity };
     try {
-      const [shown] = framesOf(await ask("/api/moment", { ...about, from: timeS, to: timeS }));
-      const [before] = framesOf(await ask("/api/past", { ...about, from, to, rows: ROWS }));
+      const shown = curveIn(await ask("/api/moment", { ...about, from: timeS, to: timeS }));
+      const before = curveIn(await ask("/api/past", { ...about, from, to, rows: ROWS }));
       const row = nearest(before, shown.schedule[0]);
       if (row < 0) complain(tr("The record has no valid response before this moment."));
       else references.replace({ timeS: before.timeS[row], saved: null }, tr("before the alarm"));

@@ -84,6 +84,8 @@ export class Bode {
     /** @type {Quantity | null} */
     this.quantity = null;
     this.line = 0;
+    /** Whether the cursor has its first place, or a person has moved it. */
+    this.aimed = false;
     /** What shows the curves instead of the three charts. @type {import("./plane.js").Plane | null} */
     this.plane = null;
   }
@@ -118,6 +120,7 @@ export class Bode {
     this.quantity = quantity;
     this.symbol = of?.symbol ?? "";
     this.units = of?.units ?? [];
+    if (this.lines.join() !== facts.frequency_hz.join()) this.aimed = false;
     this.lines = facts.frequency_hz;
     this.grid = facts.grid_hz;
     this.at = this.lines.map((f) =>
@@ -345,6 +348,7 @@ export class Bode {
 
   /** The cursor to the line nearest to a frequency. @param {number} hz */
   go(hz) {
+    this.aimed = true;
     this.line = this.nearest(hz);
     this.tell();
     this.ring();
@@ -365,6 +369,7 @@ export class Bode {
    */
   step(by) {
     if (!this.charts.length) return;
+    this.aimed = true;
     this.line = Math.min(this.lines.length - 1, Math.max(0, this.line + by));
     this.tell();
     this.ring();

@@ -73,7 +73,8 @@ export function controls(
     }
     for (const choice of ["map-what", "map-over"]) $(choice).hidden = name !== "map";
     $("signals-picture").hidden = name !== "signals";
-    page.dirty.add("trends").add("rows");
+    page.dirty.delete("map");
+    page.dirty.add("fits").add("trends").add("rows");
     page.last.map = -1e9;
   }
 
@@ -105,7 +106,6 @@ export function controls(
       tracking.build();
       page.dirty.add("rows");
     },
-    complain,
   );
   const over = new Option(
     $("tracking-over"),
@@ -119,19 +119,12 @@ export function controls(
       tracking.build();
       page.dirty.add("rows");
     },
-    complain,
   );
-  new Option(
-    $("tracking-span"),
-    "span",
-    SPANS,
-    (value) => {
-      page.spanS = value;
-      page.rows.clear();
-      fill();
-    },
-    complain,
-  );
+  new Option($("tracking-span"), "span", SPANS, (value) => {
+    page.spanS = value;
+    page.rows.clear();
+    fill();
+  });
   new Option(
     $("map-what"),
     "map",
@@ -145,7 +138,6 @@ export function controls(
       map.paint();
       page.dirty.add("rows");
     },
-    complain,
   );
   const mapOver = new Option(
     $("map-over"),
@@ -158,7 +150,6 @@ export function controls(
       map.over = value;
       page.dirty.add("rows");
     },
-    complain,
   );
   const picture = new Option(
     $("signals-picture"),
@@ -170,7 +161,6 @@ export function controls(
     (value) => {
       signals.picture = value;
     },
-    complain,
   );
   /** @param {"time" | "spectrum"} value */
   const showSignals = (value) => {
@@ -252,7 +242,7 @@ export function controls(
     $("keys-list"),
     [
       [["?"], tr("this help"), () => help.showModal()],
-      [[" "], tr("pause or resume"), () => timeline.toggle()],
+      [[" "], tr("play, pause or resume"), () => timeline.toggle()],
       [["←", "→"], tr("move the cursor to the next line"), null],
       [[",", "."], tr("{seconds} s backward or forward in the record", { seconds: fixed(0.1, 1) }), null],
       [["1", "2", "3", "4"], tr("plant, open loop, closed loop, sensitivity"), null],

@@ -5,9 +5,9 @@
 /** @import { Curves } from "./messages.js" */
 /**
  * A peak or an antiresonance. `damping` is (f₂ − f₁)/2f at half power (3.01 dB beside the extremum), NaN where the curve
- * does not come that far on both sides.
+ * does not come that far on both sides. `lowHz`, `highHz` are the frequencies beside it, between which it is.
  *
- * @typedef {{peak: boolean, hz: number, db: number, damping: number, of: Curves}} Extremum
+ * @typedef {{peak: boolean, hz: number, lowHz: number, highHz: number, db: number, damping: number, of: Curves}} Extremum
  */
 
 const HALF_POWER_DB = 10 * Math.log10(2);
@@ -51,7 +51,8 @@ export function extrema(hz, db, reach, peak) {
       above = crossing(x, y, i, 1, height - HALF_POWER_DB);
     const f = Math.exp(at),
       damping = (Math.exp(above) - Math.exp(below)) / (2 * f);
-    found.push({ peak, hz: f, db: peak ? height : -height, damping });
+    const [lowHz, highHz] = [hz[use[i - 1]], hz[use[i + 1]]];
+    found.push({ peak, hz: f, lowHz, highHz, db: peak ? height : -height, damping });
   }
   return found;
 }

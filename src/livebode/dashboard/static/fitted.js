@@ -1,29 +1,27 @@
 // @ts-check
-// What the fits know at a time: margins of the loop, modes with their damping, the delay.
+// What the drawn fit knows: margins of the loop, modes with their damping, the delay.
 import { tr } from "./language.js";
 import { bounded } from "./trends.js";
 
 /** @import { Mark } from "./marks.js" */
 /** @import { Series } from "./series.js" */
-/** @typedef {{peak: boolean, hz: number, damping: number, words: string}} Mode */
+/** `value` is the frequency with its bound. @typedef {{peak: boolean, hz: number, damping: number, value: string, words: string}} Mode */
 
 /**
  * Margins as marks on the open loop. Gain margins are read where the phase crosses −180°, phase and delay margin where
  * the magnitude crosses 0 dB.
  *
  * @param {Map<string, Series>} items rows of the model "margins", by name
- * @param {number} atS NaN: the newest
  * @returns {Mark[]}
  */
-export function marginMarks(items, atS) {
+export function marginMarks(items) {
   /** @param {string} name */
   const read = (name) => {
-    const [series, place] = [items.get(name), items.get(`${name}_frequency`)];
-    if (!series?.t.length || !place?.t.length) return null;
-    const at = series.at(atS),
-      [value, hz] = [series.v[at], place.v[place.at(atS)]];
-    if (!Number.isFinite(value) || !Number.isFinite(hz)) return null;
-    return { name, hz, value, words: bounded(value, series.s[at], series.unit) };
+    const series = items.get(name),
+      row = series?.shown,
+      hz = items.get(`${name}_frequency`)?.shown?.v ?? NaN;
+    if (!row || !Number.isFinite(row.v) || !Number.isFinite(hz)) return null;
+    return { name, hz, value: row.v, words: bounded(row.v, row.s, series.unit) };
   };
   /** @type {Mark[]} */
   const found = [];
@@ -56,22 +54,22 @@ const MODE = /^(anti)?resonance(_\d+)?$/;
  * Resonances and antiresonances of the fitted model.
  *
  * @param {Iterable<Series>} all
- * @param {number} atS
  * @returns {Mode[]}
  */
-export function modes(all, atS) {
+export function modes(all) {
   const items = [...all];
   return items.flatMap((series) => {
     const beside = items.find((s) => s.model === series.model && s.name === `${series.name}_damping`);
-    if (!MODE.test(series.name) || !series.t.length || !beside?.t.length) return [];
-    const [at, also] = [series.known(atS), beside.known(atS)];
-    const [hz, damping] = [series.v[at], beside.v[also]];
+    if (!MODE.test(series.name) || !series.shown || !beside?.shown) return [];
+    const { v: hz, s } = series.shown,
+      { v: damping, s: spread } = beside.shown;
     if (!(hz > 0)) return [];
+    const value = bounded(hz, s, "Hz");
     const words = tr("fit: {hz}, damping {damping}", {
-      hz: bounded(hz, series.s[at], "Hz"),
-      damping: bounded(damping, beside.s[also], ""),
+      hz: value,
+      damping: bounded(damping, spread, ""),
     });
-    return [{ peak: !series.name.startsWith("anti"), hz, damping, words }];
+    return [{ peak: !series.name.startsWith("anti"), hz, damping, value, words }];
   });
 }
 
@@ -79,13 +77,8 @@ export function modes(all, atS) {
  * Fitted delay in ms; NaN if none is fitted.
  *
  * @param {Iterable<Series>} all
- * @param {number} atS
  */
-export function delayMs(all, atS) {
-  for (const series of all) {
-    if (series.name !== "delay" || !series.t.length) continue;
-    const value = series.v[series.known(atS)];
-    if (value) return 1000 * value;
-  }
+export function delayMs(all) {
+  for (const { name, shown } of all) if (name === "delay" && shown?.v) return 1000 * shown.v;
   return NaN;
 }

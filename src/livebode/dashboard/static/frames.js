@@ -1,7 +1,7 @@
 // @ts-check
 // Frames from the server as typed arrays; frames.py documents the layout.
 
-/** @import { Frame, FrameKind, Quantity, Reference } from "./messages.js" */
+/** @import { Fits, Frame, FrameKind, Quantity, Reference } from "./messages.js" */
 
 /** @type {Reference[]} */
 export const REFERENCES = [
@@ -14,16 +14,18 @@ export const REFERENCES = [
   "reference 7",
   "reference 8",
 ];
-/** @type {FrameKind[]} */
-const KINDS = ["newest", "moment", "reference", "baseline", "model", "rows", "history", ...REFERENCES.slice(1)];
+/** @type {(FrameKind | "fits")[]} */
+const KINDS = ["newest", "moment", "reference", "baseline", "model", "rows", "history", "fits", ...REFERENCES.slice(1)];
 /** @type {Quantity[]} */
 export const QUANTITIES = ["plant", "open loop", "closed loop", "sensitivity"];
+
+const TEXT = new TextDecoder();
 
 /**
  * All frames of a message, in order.
  *
  * @param {ArrayBuffer} buffer
- * @returns {Generator<Frame, void>}
+ * @returns {Generator<Frame | Fits, void>}
  */
 export function* framesOf(buffer) {
   const view = new DataView(buffer);
@@ -35,6 +37,14 @@ export function* framesOf(buffer) {
       columns = view.getUint32(at + 12, true),
       cells = rows * columns;
     let next = at + 16;
+    const kind = KINDS[view.getUint8(at + 5)],
+      quantity = QUANTITIES[view.getUint8(at + 6)],
+      axis = view.getUint8(at + 7);
+    if (kind === "fits") {
+      yield { kind, quantity, axis, trends: JSON.parse(TEXT.decode(new Uint8Array(buffer, next, rows))) };
+      at = (next + rows + 7) & ~7;
+      continue;
+    }
     const doubles = () => {
       const a = new Float64Array(buffer, next, rows);
       next += 8 * rows;
@@ -46,9 +56,9 @@ export function* framesOf(buffer) {
       return a;
     };
     yield {
-      kind: KINDS[view.getUint8(at + 5)],
-      quantity: QUANTITIES[view.getUint8(at + 6)],
-      axis: view.getUint8(at + 7),
+      kind,
+      quantity,
+      axis,
       rows,
       columns,
       timeS: doubles(),
@@ -62,6 +72,12 @@ export function* framesOf(buffer) {
     };
     at = (next + 7) & ~7;
   }
+}
+
+/** The first curve of an answer. @param {ArrayBuffer} buffer */
+export function curveIn(buffer) {
+  for (const frame of framesOf(buffer)) if (frame.kind !== "fits") return frame;
+  throw new Error("the answer has no curve");
 }
 
 // Edges of the 95 % bound around a magnitude in dB or a phase in degrees; see frames.py.

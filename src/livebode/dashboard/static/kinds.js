@@ -22,20 +22,14 @@ const KINDS = [
 export function kinds(bode, complain) {
   const host = $("plane"),
     near = $("near");
-  const option = new Option(
-    $("bode-kind"),
-    "view",
-    KINDS,
-    (kind) => {
-      host.hidden = kind === "bode";
-      near.hidden = kind === "bode";
-      for (const other of bode.hosts) other.hidden = kind !== "bode";
-      bode.plane = kind === "bode" ? null : new Plane(bode, host, kind);
-      $("bode-title").textContent = bode.plane?.title ?? tr("Bode plot");
-      bode.rebuild();
-    },
-    complain,
-  );
+  const option = new Option($("bode-kind"), "view", KINDS, (kind) => {
+    host.hidden = kind === "bode";
+    near.hidden = kind === "bode";
+    for (const other of bode.hosts) other.hidden = kind !== "bode";
+    bode.plane = kind === "bode" ? null : new Plane(bode, host, kind);
+    $("bode-title").textContent = bode.plane?.title ?? tr("Bode plot");
+    bode.rebuild();
+  });
   option.entry = true;
   near.addEventListener("click", () => {
     if (bode.plane?.loop) bode.plane.near();

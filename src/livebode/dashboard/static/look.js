@@ -1,5 +1,5 @@
 // @ts-check
-// The sentence at the top of the page; a screen reader hears it when its meaning changes, not every second.
+// The verdict at the top of the page: large if a person must act, else beside the result; a screen reader hears it when its meaning changes, not every second.
 import { byId as $ } from "./make.js";
 import { sentence } from "./verdict.js";
 
@@ -24,6 +24,7 @@ export function firstLook(page) {
   const shown = `${SIGNS[tone]} ${text}`;
   if (host.textContent !== shown) host.textContent = shown;
   host.className = `first-look ${tone}`;
+  $("headline").className = `headline ${tone}`;
   host.title = detail;
   const meaning = page.up ? `${verdict?.word} ${verdict?.cause}` : "";
   if (meaning === heard) return;

@@ -10,6 +10,7 @@ import { curvesMenu } from "./curves-menu.js";
 import { describe } from "./describe.js";
 import { Events } from "./events.js";
 import { delayMs, marginMarks, modes } from "./fitted.js";
+import { folds } from "./fold.js";
 import { framesOf, QUANTITIES } from "./frames.js";
 import { health } from "./health.js";
 import { tr } from "./language.js";
@@ -19,10 +20,13 @@ import { firstLook } from "./look.js";
 import { Lost } from "./lost.js";
 import { byId as $, choose, element, segments } from "./make.js";
 import { LineMap } from "./map.js";
-import { isMargin, Margins, marginWords } from "./margins.js";
+import { isMargin, Margins, marginWords as marginTitle } from "./margins.js";
+import { marginWords } from "./marks.js";
+import { notable } from "./notable.js";
 import { past } from "./past.js";
 import { readout } from "./readout.js";
 import { References } from "./references.js";
+import { resultWords } from "./result.js";
 import { Rows } from "./rows.js";
 import { Saved } from "./saved.js";
 import { axisInAddress, rememberAxis, rememberMoment, timeInAddress } from "./shared.js";
@@ -40,16 +44,16 @@ import { worded } from "./worded.js";
 import { named } from "./words.js";
 import { zoneChoice } from "./zone.js";
 
-/** @import { Beginning, Page, Quantity, Run } from "./messages.js" */
+/** @import { Beginning, Fits, Frame, Page, Part, Quantity, Run } from "./messages.js" */
 
 const TEXT_MS = 120,
   TRACK_MS = 100,
   MAP_MS = 600;
+const NO_POSITION = tr("This run has no position: name its channel as schedule under [signals].");
 const REFERENCE_GONE = tr("A new run with other lines or another quantity has started: the references were released.");
-const NO_POSITION = tr("This run has no position: name its channel as schedule under [signals]."),
-  NO_MOTION = tr("The position does not change in the time shown.");
 
 applyTheme();
+folds();
 /** @type {Page} */
 const page = {
   axis: 0,
@@ -80,9 +84,9 @@ const bode = new Bode(
     page.dirty.add("read");
   },
   {
-    margins: () => marginMarks(margins.items, timeline.atS ?? NaN),
+    margins: () => marginMarks(margins.items),
     laid: () => drawLegend(),
-    modes: () => modes(parameters.items.values(), timeline.atS ?? NaN),
+    modes: () => modes(parameters.items.values()),
   },
 );
 const tracking = new Tracking($("tracking"), $("tracking-lines"));
@@ -93,7 +97,7 @@ const parameters = new Trends(
   tr("No model is fitted: add [fit] to the configuration."),
 );
 const margins = new Margins($("margins"));
-const marginTrends = new Trends($("margin-trends"), isMargin, "", marginWords);
+const marginTrends = new Trends($("margin-trends"), isMargin, "", marginTitle);
 const events = new Events(
   {
     host: $("events"),
@@ -114,6 +118,7 @@ const timeline = new Timeline(
     now: $("time-now"),
   },
   {
+    drawnS: () => bode.curves.measured?.frame?.timeS[0],
     onMoment: (timeS) => {
       rememberMoment(timeS);
       showMoment(timeS);
@@ -158,7 +163,7 @@ const link = new Link({
       page.health = news.health;
       health($("health"), news.health, page.facts, timeline.span);
       margins.lines = news.health.ms_at_lines;
-      page.dirty.add("trends");
+      page.dirty.add("fits");
     }
     if (news.verdicts) page.verdicts = news.verdicts;
     events.nowS = timeline.span.last_s;
@@ -166,7 +171,6 @@ const link = new Link({
     if (news.newest) {
       for (const trend of news.newest) {
         parameters.take(trend);
-        margins.take(trend);
         marginTrends.take(trend);
       }
       page.dirty.add("trends");
@@ -178,7 +182,7 @@ const link = new Link({
   },
 });
 
-/** @param {import("./messages.js").Frame} frame */
+/** @param {Frame | Fits} frame */
 function takeFrame(frame) {
   if (!page.facts?.begun || frame.axis !== page.axis || frame.quantity !== page.quantity) return;
   if (frame.kind === "rows") {
@@ -187,8 +191,17 @@ function takeFrame(frame) {
     return;
   }
   if (!frame.kind.startsWith("reference") && timeline.atS !== null) return;
-  bode.take(frame);
-  page.dirty.add("bode");
+  if (frame.kind === "fits") showFits(frame);
+  else {
+    bode.take(frame);
+    page.dirty.add("bode");
+  }
+}
+
+/** What is printed of the fits; the model of the same fit is drawn in the same frame of the screen. @param {Fits} fits */
+function showFits({ trends }) {
+  for (const shown of [parameters, margins, marginTrends]) shown.show(trends);
+  page.dirty.add("bode").add("fits");
 }
 
 /**
@@ -235,6 +248,7 @@ function restore(span) {
 function axisChosen(axis) {
   page.axis = page.wanted = axis;
   page.quantity = null;
+  timeline.stop();
   timeline.atS = null;
   page.zoom = null;
   link.forget("pause");
@@ -275,16 +289,7 @@ function begin({ facts, axes, trends }) {
   page.axis = facts.axis;
   page.schedule = named(facts.schedule);
   document.title = `${facts.name} · livebode`;
-  segments(
-    $("quantities"),
-    facts.quantities.map(({ name, symbol, why_not: why }) => ({
-      value: name,
-      text: `${worded(name)} ${symbol}`,
-      why: why && worded(why),
-    })),
-    page.quantity,
-    watch,
-  );
+  showQuantities(facts);
   if (page.key !== key) {
     page.key = key;
     page.rows = new Rows(facts.frequency_hz.length);
@@ -300,18 +305,34 @@ function begin({ facts, axes, trends }) {
   if (gone) references.releaseAll();
   if (!page.restored) references.restore();
   page.restored = true;
-  over.disable("position", facts.schedule ? "" : NO_POSITION);
-  mapOver.disable("position", facts.schedule ? "" : NO_POSITION);
+  over.permit("position", Boolean(facts.schedule));
+  mapOver.permit("position", Boolean(facts.schedule));
   drawLegend();
   for (const part of Object.values(additions)) part.begin();
   parameters.begin(trends);
-  margins.begin(trends, whyNoMargins(facts));
+  margins.begin(whyNoMargins(facts));
   marginTrends.begin(trends);
   events.begin(facts.axis, facts.role === "operator" && facts.live);
-  const remarks = [gone ? REFERENCE_GONE : "", refused, worded(facts.remark)].filter(Boolean);
+  const unplaced = !facts.schedule && over.wanted === "position" ? NO_POSITION : "";
+  const remarks = [gone ? REFERENCE_GONE : "", refused, unplaced, worded(facts.remark)].filter(Boolean);
   if (remarks.length) complain(remarks.join(" "));
   if (timeline.atS !== null) showMoment(timeline.atS);
   if (facts.watched !== page.quantity) watchShown();
+}
+
+/** Those that this run has; why the others are absent is said on request. @param {Run} facts */
+function showQuantities({ quantities }) {
+  const [known, absent] = [quantities.filter((q) => !q.why_not), quantities.filter((q) => q.why_not)];
+  segments(
+    $("quantities"),
+    known.map(({ name, symbol }) => ({ value: name, text: `${worded(name)} ${symbol}` })),
+    page.quantity,
+    watch,
+  );
+  const button = $("absent");
+  button.hidden = !absent.length;
+  button.textContent = tr("no {symbols}: why?", { symbols: absent.map(({ symbol }) => symbol).join(", ") });
+  button.onclick = () => complain([...new Set(absent.map(({ why_not: why }) => worded(why)))].join(" "));
 }
 
 /**
@@ -330,10 +351,11 @@ function clear() {
     page.facts = { ...page.facts, begun: false, name: axisChoice.selectedOptions[0]?.text ?? page.facts.name };
   page.rows.clear();
   for (const panel of [bode, tracking, map, signals]) panel.clear();
-  for (const id of ["health", "readout", "quantities"]) $(id).replaceChildren();
+  for (const id of ["health", "readout", "quantities", "result"]) $(id).replaceChildren();
+  $("absent").hidden = true;
   parameters.begin([]);
-  margins.lines = null;
-  margins.begin([], tr("No samples have arrived yet."));
+  margins.clear();
+  margins.begin(tr("No samples have arrived yet."));
   marginTrends.begin([]);
   events.begin(page.axis, false);
   timeline.take({ first_s: null, last_s: null, live: false, growing: false });
@@ -350,7 +372,7 @@ function newClock() {
   signals.redraw();
   parameters.refresh();
   marginTrends.refresh();
-  for (const what of ["bode", "read", "rows", "trends"]) page.dirty.add(what);
+  page.dirty.add("bode").add("read").add("rows").add("trends");
 }
 
 /** @param {Run} facts */
@@ -384,10 +406,11 @@ function status() {
   if (!facts) return;
   const known = { up, facts, health };
   document.body.classList.toggle("not-begun", !facts.begun);
-  const [word, look] = lamp(known, timeline.span, timeline.atS !== null);
+  const [word, look] = lamp(known, timeline.span, timeline.atS !== null && timeline.following);
   $("lamp").className = `lamp ${look}`;
   // The long name of an entry is in the choice beside it: twice there, the header would need a second row.
   $("status-text").textContent = facts.begun && facts.matrix ? word : `${facts.name} · ${word}`;
+  $("status").title = facts.name;
   lost.show(known, timeline.span.live && timeline.atS === null);
   firstLook(page);
   wall.draw();
@@ -402,12 +425,37 @@ function curvesChanged() {
   curves?.fill();
 }
 
+let aimedAt = "";
+/** The first cursor and the tracked lines are where the response has something to show. @param {Run} facts */
+function aim(facts) {
+  if (!bode.curves.measured || aimedAt === page.key) return;
+  const { resonances, antiresonances, crossovers, fitted } = notable(bode);
+  if (fitted || !facts.model) aimedAt = page.key ?? "";
+  tracking.suggest([...resonances, ...antiresonances, ...crossovers]);
+  if (bode.aimed || !resonances.length) return;
+  bode.go(resonances[0]);
+  bode.aimed = fitted || !facts.model;
+}
+
+function showMargins() {
+  const words = marginWords(bode);
+  if ($("margin-words").textContent === words) return;
+  $("margin-words").textContent = words;
+  $("margin-words").hidden = !words;
+}
+
+/** @param {Run} facts */
+function showResult(facts) {
+  const words = resultWords(facts, bode, parameters);
+  if ($("result").textContent !== words) $("result").textContent = words;
+}
+
 /** @param {number} now */
 function draw(now) {
   requestAnimationFrame(draw);
   if (!page.facts?.begun || !bode.charts.length) return;
   /**
-   * @param {string} what
+   * @param {Part} what
    * @param {number} ms
    */
   const due = (what, ms) => {
@@ -416,24 +464,36 @@ function draw(now) {
     page.last[what] = now;
     return true;
   };
-  if (due("bode", 0)) bode.draw();
+  if (due("bode", 0)) {
+    bode.draw();
+    aim(page.facts);
+    showMargins();
+  }
+  if (due("fits", 0)) {
+    showResult(page.facts);
+    margins.draw(timeline.atS !== null); // on paper it is shown in every tab
+  }
   if (due("additions", 0)) for (const part of Object.values(additions)) part.draw();
-  if (due("read", TEXT_MS) && page.read) readout($("readout"), ...page.read, page.schedule, bode);
+  if (due("read", TEXT_MS)) {
+    if (page.read) readout($("readout"), ...page.read, page.schedule, bode);
+    showResult(page.facts);
+  }
   if (due("rows", TRACK_MS)) drawRows(now);
-  if (page.tab === "map" && page.seen && due("map", timeline.atS === null ? MAP_MS : 0)) {
+  if (page.seen && due("map", timeline.atS === null ? MAP_MS : 0)) {
     map.draw(...page.seen);
-    if (map.cells && page.facts?.schedule) mapOver.disable("position", map.cells.moved ? "" : NO_MOTION);
+    if (map.cells && page.facts?.schedule) mapOver.permit("position", map.cells.moved);
   }
   if (due("trends", 250)) {
-    if (page.tab === "parameters") parameters.draw(timeline.atS ?? NaN, page.zoom);
-    if (page.tab === "margins") {
-      margins.draw(timeline.atS ?? NaN);
-      marginTrends.draw(timeline.atS ?? NaN, page.zoom);
-    }
+    if (page.tab === "parameters") parameters.draw(page.zoom);
+    if (page.tab === "margins") marginTrends.draw(page.zoom);
   }
 }
 
-const { fill, showMoment, goLive, drawRows } = past(page, { bode, tracking, timeline, link }, { complain, status });
+const { fill, showMoment, goLive, drawRows } = past(
+  page,
+  { bode, tracking, timeline, link },
+  { complain, status, showFits },
+);
 const references = new References(bode, link, { changed: curvesChanged, complain });
 const saved = new Saved(() => page.axis, {
   changed: (annotations) => {
@@ -448,7 +508,7 @@ const parts = { bode, tracking, map, signals, timeline, events, wall, references
 const { over, mapOver } = controls(page, parts, { watch, fill, watchShown, clear, complain, axisChosen });
 const showAlarm = alarmMoment(page, timeline, { references, complain });
 tools($("bode-tools"), bode);
-viewMenu($("bode-view"), $("bode-view-panel"), bode, () => delayMs(parameters.items.values(), timeline.atS ?? NaN));
+viewMenu($("bode-view"), $("bode-view-panel"), bode, () => delayMs(parameters.items.values()));
 /** @param {number} axis */
 const chooseAxis = (axis) => {
   axisChoice.value = String(axis);

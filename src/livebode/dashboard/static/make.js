@@ -35,29 +35,27 @@ export function element(tag, attributes = {}, ...children) {
 }
 
 /**
- * Buttons of which one is chosen; `why` is the reason that one is disabled.
+ * Buttons of which one is chosen.
  *
  * @template {string} V
  * @param {HTMLElement} host
- * @param {{value: V, text: string, why?: string}[]} choices
+ * @param {{value: V, text: string}[]} choices
  * @param {V | null} chosen
- * @param {(value: V, why?: string) => void} onChoose
+ * @param {(value: V) => void} onChoose
  */
 export function segments(host, choices, chosen, onChoose) {
   const focused = host.contains(document.activeElement);
   host.replaceChildren();
-  const buttons = choices.map(({ value, text, why }) =>
+  const buttons = choices.map(({ value, text }) =>
     element(
       "button",
       {
         type: "button",
         role: "radio",
         "aria-checked": String(value === chosen),
-        "aria-disabled": why ? "true" : null,
         tabindex: value === chosen ? 0 : -1,
-        title: why || "",
         "data-value": value,
-        onclick: () => onChoose(value, why),
+        onclick: () => onChoose(value),
       },
       text,
     ),
@@ -73,7 +71,7 @@ export function segments(host, choices, chosen, onChoose) {
       (buttons.indexOf(/** @type {HTMLButtonElement} */ (document.activeElement)) + step + buttons.length) %
       buttons.length;
     buttons[at].focus();
-    if (!choices[at].why) onChoose(choices[at].value, "");
+    onChoose(choices[at].value);
   };
 }
 

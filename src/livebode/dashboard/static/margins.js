@@ -40,36 +40,41 @@ export class Margins {
   }
 
   /**
-   * @param {Trend[]} list
    * @param {string} why there may be none
    */
-  begin(list, why) {
-    this.items.clear();
+  begin(why) {
     this.why = why;
-    for (const trend of list) this.take(trend);
     this.draw();
   }
 
-  /** @param {Trend} trend */
-  take(trend) {
-    if (trend.model !== "margins") return;
-    const series = this.items.get(trend.name) ?? new Series(trend);
-    this.items.set(trend.name, series);
-    series.take(trend);
+  // Show nothing until the next fit.
+  clear() {
+    this.items.clear();
+    this.lines = null;
   }
 
-  // The margins at a time, or the newest.
-  draw(atS = NaN) {
+  /** The margins with the fit that is drawn. @param {Trend[]} list one row of each parameter */
+  show(list) {
+    this.items.clear();
+    for (const trend of list) {
+      if (trend.model !== "margins") continue;
+      const series = new Series(trend);
+      this.items.set(trend.name, series);
+      series.show(trend);
+    }
+  }
+
+  /** @param {boolean} [paused] a time in the past is shown */
+  draw(paused = false) {
     const { lines, items } = this,
       rows = [];
     for (const [name, words, small] of ROWS) {
-      const found = items.get(name);
-      if (!found?.t.length) continue;
-      const row = found.at(atS),
-        beside = items.get(`${name}_frequency`);
-      const at = beside ? beside.v[beside.at(atS)] : NaN,
-        value = found.v[row];
-      const none = found.status[row] === "none",
+      const found = items.get(name),
+        row = found?.shown;
+      if (!row) continue;
+      const at = items.get(`${name}_frequency`)?.shown?.v ?? NaN,
+        value = row.v;
+      const none = row.status === "none",
         mark = !none && small(value);
       rows.push(
         element(
@@ -79,15 +84,15 @@ export class Margins {
           element(
             "td",
             { class: mark ? "small" : "" },
-            none ? tr("no limit") : `${bounded(value, found.s[row], found.unit)}${mark ? ` ⚠ ${tr("small")}` : ""}`,
+            none ? tr("no limit") : `${bounded(value, row.s, found.unit)}${mark ? ` ⚠ ${tr("small")}` : ""}`,
           ),
           element("td", {}, Number.isFinite(at) ? `${plain(at, 3)} Hz` : ""),
-          element("td", {}, none ? tr("no crossing") : worded(found.status[row])),
+          element("td", {}, none ? tr("no crossing") : worded(row.status)),
         ),
       );
     }
     // It belongs to the newest response, so it is not shown for a time in the past.
-    if (lines && !Number.isFinite(atS))
+    if (lines && !paused)
       rows.push(
         element(
           "tr",

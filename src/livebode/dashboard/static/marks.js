@@ -16,7 +16,8 @@ import { plain } from "./words.js";
  *
  * @typedef {{name: string, chart: 0 | 1, hz: number, level: number, value: number, words: string, of?: "what if"}} Mark
  */
-/** @typedef {{ctx: CanvasRenderingContext2D, px: number, u: Chart, index: number, bode: Bode}} Sheet */
+/** `taken`: places that have words. @typedef {{ctx: CanvasRenderingContext2D, px: number, u: Chart, index: number, bode: Bode, taken: Box[]}} Sheet */
+/** In pixels of the canvas. @typedef {{left: number, top: number, right: number, bottom: number}} Box */
 
 const MAGNITUDE = 0,
   PHASE = 1;
@@ -30,7 +31,8 @@ const FONT = (/** @type {number} */ px) => `600 ${11.5 * px}px system-ui, "DejaV
 export function drawMarks(bode, u, index) {
   const { ctx, bbox } = u,
     px = devicePixelRatio,
-    sheet = { ctx, px, u, index, bode };
+    /** @type {Sheet} */
+    sheet = { ctx, px, u, index, bode, taken: [] };
   ctx.save();
   ctx.beginPath();
   ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
@@ -116,6 +118,70 @@ export function label({ ctx, px, u }, text, x, y, paint) {
   ctx.fillText(text, at + 4 * px, middle + 11.2 * px);
 }
 
+const ROW_PX = 17,
+  CLEAR_PX = 4; // between words and a curve
+
+/** Words beside a mark where neither a curve nor other words are; none where there is no such place. @param {Sheet} sheet @param {string} text @param {number} x @param {number} y @param {string} paint */
+function labelClear(sheet, text, x, y, paint) {
+  const { ctx, px, u, taken } = sheet,
+    { left, top, width: room, height: tall } = u.bbox,
+    width = ctx.measureText(text).width + 8 * px,
+    height = 15 * px;
+  const rows = Array.from(
+    { length: Math.floor(tall / (ROW_PX * px)) * 2 },
+    (_, i) => (i % 2 ? 1 : -1) * Math.ceil(i / 2),
+  );
+  const sides = [x + 6 * px, x - width - 6 * px].filter((at) => at >= left && at + width <= left + room);
+  for (const row of rows)
+    for (const at of sides) {
+      const above = y - height / 2 + row * ROW_PX * px;
+      if (above < top || above + height > top + tall) continue;
+      const box = { left: at, top: above, right: at + width, bottom: above + height };
+      if (taken.some((other) => meet(box, other)) || covered(sheet, box)) continue;
+      taken.push(box);
+      label(sheet, text, at - 6 * px, above + height / 2, paint);
+      return;
+    }
+}
+
+/** @param {Box} a @param {Box} b */
+const meet = (a, b) => a.left < b.right && a.right > b.left && a.top < b.bottom && a.bottom > b.top;
+
+/** Whether a curve or its bounds are in a box. @param {Sheet} sheet @param {Box} box */
+function covered({ u, bode, index, px }, box) {
+  const clear = CLEAR_PX * px;
+  return bode.laid.some((name) => {
+    const first = bode.seriesOf(index, name);
+    if (first < 1 || !bode.shown.has(name)) return false;
+    const own = name === "model" ? [first] : [first, first + 1, first + 2].filter((i) => i < u.data.length);
+    let before = NaN; // a line comes from there
+    return Array.from(u.data[0]).some((hz, i) => {
+      const ys = own.flatMap((k) => {
+        const v = u.data[k][i];
+        return typeof v === "number" && Number.isFinite(v) ? [u.valToPos(v, "y", true)] : [];
+      });
+      if (!ys.length) return false;
+      const x = u.valToPos(hz, "x", true);
+      const reach = [...ys, ...(Number.isFinite(before) ? [before] : [])];
+      before = name === "measured" && bode.few ? NaN : ys[0];
+      if (x < box.left - clear || x > box.right + clear) return false;
+      return Math.min(...reach) < box.bottom + clear && Math.max(...reach) > box.top - clear;
+    });
+  });
+}
+
+/** The margins in words, with their frequencies; empty where there are none. @param {Bode} bode */
+export const marginWords = (bode) =>
+  ofLoop(bode)
+    ? marksOf(bode)
+        .map(({ words, hz, chart, of }) => {
+          const name = chart ? tr("phase margin") : tr("gain margin");
+          const margin = of ? `${name} ${words}` : words;
+          return tr("{margin} at {hz} Hz", { margin, hz: plain(hz, 3) });
+        })
+        .join(" · ")
+    : "";
+
 /** Margins of the fitted model, and those of the derived curve; alone where both would hide the curves. @param {Bode} bode */
 export function marksOf({ derived, known }) {
   const marks = derived?.marks() ?? [];
@@ -125,7 +191,7 @@ export function marksOf({ derived, known }) {
 /** @param {Mark} mark */
 export const paintOf = ({ of }) => look(of ?? "model").ink;
 
-const NARROW = 420; // width of a plot, in pixels of the page
+export const NARROW = 420; // width of a plot, in pixels of the page
 
 /** @param {Sheet} sheet */
 function drawLoop(sheet) {
@@ -135,12 +201,10 @@ function drawLoop(sheet) {
   if (index === PHASE)
     for (let deg = 360 * Math.ceil((min - 180) / 360) + 180; deg <= max; deg += 360)
       horizontal(sheet, deg, `${deg < 0 ? "−" : ""}${Math.abs(deg)}°`);
-  // On a telephone the addition has the margins in words above the plot: here they would hide the curves.
-  const wordless = bode.derived?.alone && u.bbox.width < NARROW * px;
-  let outside = 0;
+  const wordless = u.bbox.width < NARROW * px; // they are below the plot, too
   for (const mark of marksOf(bode)) {
     if (!inSight(sheet, mark.hz)) {
-      if (mark.chart === index && !wordless) beyond(sheet, mark, outside++);
+      if (mark.chart === index && !wordless) beyond(sheet, mark);
       continue;
     }
     const base = baseOf(bode, index, mark),
@@ -151,7 +215,7 @@ function drawLoop(sheet) {
       const [y0, y1] = [u.valToPos(base, "y", true), u.valToPos(base + mark.level, "y", true)];
       line(ctx, x, y0, x, y1);
       for (const y of [y0, y1]) line(ctx, x - 4 * px, y, x + 4 * px, y);
-      if (!wordless) label(sheet, mark.words, x, (y0 + y1) / 2, paintOf(mark));
+      if (!wordless) labelClear(sheet, mark.words, x, (y0 + y1) / 2, paintOf(mark));
     } else if (index !== 2 && mark.name !== "delay_margin") {
       // The crossover, where the other curve passes 0 dB or −180°.
       ctx.lineWidth = 1.8 * px;
@@ -162,13 +226,13 @@ function drawLoop(sheet) {
   }
 }
 
-/** A margin at a frequency that is not visible, at the edge beside which it is. @param {Sheet} sheet @param {Mark} mark @param {number} row */
-function beyond(sheet, mark, row) {
+/** A margin at a frequency that is not visible, at the edge beside which it is. @param {Sheet} sheet @param {Mark} mark */
+function beyond(sheet, mark) {
   const { u, bode, px } = sheet,
     left = mark.hz < bode.sight[0],
     text = tr("{margin} at {hz} Hz", { margin: mark.words, hz: plain(mark.hz, 3) });
   const x = left ? u.bbox.left : u.bbox.left + u.bbox.width;
-  label(sheet, left ? `◂ ${text}` : `${text} ▸`, x, u.bbox.top + u.bbox.height - (10 + 16 * row) * px, paintOf(mark));
+  labelClear(sheet, left ? `◂ ${text}` : `${text} ▸`, x, u.bbox.top + u.bbox.height - 10 * px, paintOf(mark));
 }
 
 /**

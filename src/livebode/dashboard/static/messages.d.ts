@@ -32,6 +32,14 @@ export interface Frame {
   coherence: Float32Array;
 }
 
+/** The fits that are shown together: one row of every parameter, of the fit whose model is in the same message. */
+export interface Fits {
+  kind: "fits";
+  quantity: Quantity;
+  axis: number;
+  trends: Trend[];
+}
+
 /** Responses over time: the ring of the newest, or a frame of the record. */
 export type History = Frame | Rows;
 
@@ -122,6 +130,8 @@ export interface Health {
   samples?: number;
   gaps?: number;
   given_up?: number;
+  /** No more samples are expected. */
+  ending?: boolean;
   silent_s?: number;
   stale?: boolean;
   /** of tracking, if a person must know of it; see state.py */
@@ -318,6 +328,9 @@ export type Addition = (
   },
 ) => AddedPart;
 
+/** A part of the page that is drawn again when something of it has changed. */
+export type Part = "bode" | "fits" | "additions" | "read" | "rows" | "map" | "trends";
+
 /** What the page shows, and what is to be drawn again (`dirty`). */
 export interface Page {
   axis: number;
@@ -338,9 +351,9 @@ export interface Page {
   seen: [rows: History, fromS: number, toS: number] | null;
   /** Frequency in Hz of the line under the cursor, and the values there. */
   read: [hz: number, found: Found] | null;
-  dirty: Set<string>;
+  dirty: Set<Part>;
   /** Time in ms of the last drawing of each part. */
-  last: Record<string, number>;
+  last: Partial<Record<Part, number>>;
   /** Identifies axis, lines and quantity of what is shown. */
   key: string | null;
   /** Identifies lines and quantity of the run. */

@@ -1,5 +1,5 @@
 // @ts-check
-// A choice between a few buttons that is in the address; one of them can be disabled with the reason.
+// A choice between a few buttons that is in the address; what is not possible is absent.
 import { chosen, enter, remember } from "./address.js";
 import { segments } from "./make.js";
 
@@ -13,21 +13,19 @@ export class Option {
    * @param {string} name in the address
    * @param {[value: V, text: string][]} choices the first is the default
    * @param {(value: V) => void} act called with each other choice, also with the one of the address
-   * @param {(text: string) => void} complain
    */
-  constructor(host, name, choices, act, complain) {
+  constructor(host, name, choices, act) {
     this.host = host;
     this.name = name;
     this.choices = choices;
     this.act = act;
-    this.complain = complain;
     const values = choices.map(([value]) => value);
     this.first = values[0];
     this.wanted = chosen(name, this.first, values);
-    /** @type {V} what is shown, which differs from what is wanted while that is disabled */
+    /** @type {V} what is shown, which differs from what is wanted while that is not possible */
     this.value = this.first;
-    /** @type {Map<V, string>} */
-    this.why = new Map();
+    /** @type {Set<V>} what is not possible */
+    this.absent = new Set();
     this.follow();
   }
 
@@ -39,26 +37,22 @@ export class Option {
     this.follow();
   }
 
-  /**
-   * Disable a choice with the reason, or enable it with none.
-   *
-   * @param {V} value
-   * @param {string} why
-   */
-  disable(value, why) {
-    if ((this.why.get(value) ?? "") === why) return;
-    this.why.set(value, why);
+  /** @param {V} value @param {boolean} possible */
+  permit(value, possible) {
+    if (this.absent.has(value) !== possible) return;
+    if (possible) this.absent.delete(value);
+    else this.absent.add(value);
     this.follow();
   }
 
   follow() {
-    const possible = this.choices.find(([choice]) => !this.why.get(choice))?.[0] ?? this.first;
-    const value = this.why.get(this.wanted) ? possible : this.wanted;
+    const possible = this.choices.filter(([choice]) => !this.absent.has(choice)),
+      value = this.absent.has(this.wanted) ? (possible[0]?.[0] ?? this.first) : this.wanted;
     segments(
       this.host,
-      this.choices.map(([choice, text]) => ({ value: choice, text, why: this.why.get(choice) })),
+      possible.length > 1 ? possible.map(([choice, text]) => ({ value: choice, text })) : [],
       value,
-      (choice, why) => (why ? this.complain(why) : this.choose(choice)),
+      (choice) => this.choose(choice),
     );
     if (value === this.value) return;
     this.value = value;

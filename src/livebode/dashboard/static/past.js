@@ -1,6 +1,6 @@
 // @ts-check
 // The past: times in the record, and the history in the tracking plot and the map.
-import { framesOf } from "./frames.js";
+import { curveIn, framesOf } from "./frames.js";
 import { ask, reason } from "./link.js";
 
 /** @import { Page } from "./messages.js" */
@@ -17,9 +17,10 @@ const WHOLE_MS = 4000,
  * @param {import("./tracking.js").Tracking} parts.tracking
  * @param {import("./timeline.js").Timeline} parts.timeline
  * @param {import("./link.js").Link} parts.link
- * @param {{complain: (text: string) => void, status: () => void}} actions
+ * @param {{complain: (text: string) => void, status: () => void, showFits: (fits: import("./messages.js").Fits) => void}} actions
  */
-export function past(page, { bode, tracking, timeline, link }, { complain, status }) {
+export function past(page, { bode, tracking, timeline, link }, { complain, status, showFits }) {
+  let filledMs = -1e9;
   // The time before this page was opened: first the recent past, the whole run on request.
   async function fill() {
     const { span } = timeline,
@@ -42,9 +43,7 @@ export function past(page, { bode, tracking, timeline, link }, { complain, statu
     const live = !page.zoom && !whole && timeline.atS === null;
     const rows = live ? ROWS_LIVE : ROWS;
     try {
-      const [frame] = framesOf(
-        await ask("/api/past", { axis: page.axis, quantity: page.quantity, from, to: end, rows }),
-      );
+      const frame = curveIn(await ask("/api/past", { axis: page.axis, quantity: page.quantity, from, to: end, rows }));
       if (page.asked !== asked) return;
       page.past = { frame, from, to: end };
       if (live) page.rows = page.rows.behind(frame);
@@ -70,7 +69,12 @@ export function past(page, { bode, tracking, timeline, link }, { complain, statu
       if (timeline.atS !== null) {
         bode.drop("model");
         bode.drop("baseline");
-        for (const frame of framesOf(buffer)) if (frame.quantity === page.quantity) bode.take(frame);
+        for (const frame of framesOf(buffer)) {
+          if (frame.quantity !== page.quantity) continue;
+          if (frame.kind === "fits") showFits(frame);
+          else bode.take(frame);
+        }
+        timeline.draw();
         page.dirty.add("bode");
       }
       const { past } = page;
@@ -114,14 +118,14 @@ export function past(page, { bode, tracking, timeline, link }, { complain, statu
     } else if ((whole || paused) && page.past) {
       rows = page.past.frame;
       ({ from, to } = page.past);
-      if (whole && !paused && span.live && now - (page.last.whole ?? -1e9) > WHOLE_MS) {
-        page.last.whole = now;
+      if (whole && !paused && span.live && now - filledMs > WHOLE_MS) {
+        filledMs = now;
         fill();
       }
     } else if (!whole && !paused) from = Math.max(from, Math.min(span.first_s, end));
     page.seen = [rows, from, to];
     tracking.draw(...page.seen);
-    page.dirty.add("map");
+    if (page.tab === "map") page.dirty.add("map");
   }
 
   return { fill, showMoment, goLive, drawRows };

@@ -7,6 +7,7 @@ import { tr } from "./language.js";
 import { ofLoop } from "./marks.js";
 import { paintCurves } from "./planecurves.js";
 import { paintGround, paintLoop } from "./planemarks.js";
+import { smooth } from "./smooth.js";
 import { evenly } from "./ticks.js";
 import { mark, plain } from "./words.js";
 import { scaled, shifted } from "./zoom.js";
@@ -17,7 +18,7 @@ import { scaled, shifted } from "./zoom.js";
 /** @import { Curves } from "./messages.js" */
 /** @typedef {"nyquist" | "nichols"} PlaneKind */
 /** @typedef {[x: Range, y: Range]} Box */
-/** @typedef {{name: Curves, curve: Curve, x: Float64Array, y: Float64Array, db: number[], deg: number[]}} Traced */
+/** `path`: what is drawn through the points; null where nothing is known between them. @typedef {{name: Curves, curve: Curve, x: Float64Array, y: Float64Array, db: number[], deg: number[], path: import("./smooth.js").Path | null}} Traced */
 
 const LEFT = 52,
   BELOW = 26,
@@ -146,7 +147,8 @@ export class Plane {
   // uPlot needs data; the curves are drawn by `paint`, because they go back and forth along both axes.
   /** @returns {[number[], number[]]} */
   data() {
-    const { bode, round } = this;
+    const { bode, round } = this,
+      modelled = bode.laid.includes("model") && bode.shown.has("model") && Boolean(bode.drawn.model);
     this.traced = bode.laid.flatMap((name) => {
       const curve = bode.curves[name],
         drawn = bode.drawn[name];
@@ -158,7 +160,10 @@ export class Plane {
         turn = Math.PI / 180;
       const x = Float64Array.from(deg, (v, i) => (round ? size[i] * Math.cos(v * turn) : v)),
         y = Float64Array.from(deg, (v, i) => (round ? size[i] * Math.sin(v * turn) : db[i]));
-      return [{ name, curve, x, y, db, deg }];
+      // Between the lines of a measurement only the model is known.
+      const path =
+        name === "model" ? smooth(curve.hz, db, deg, round) : modelled && name === "measured" ? null : { x, y };
+      return [{ name, curve, x, y, db, deg, path }];
     });
     return [
       [0, 1],

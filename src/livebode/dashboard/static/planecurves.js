@@ -1,5 +1,6 @@
 // @ts-check
-// The curves in the planes of Nyquist and Nichols: points with their bounds, joined in the order of frequency.
+// The curves in the planes of Nyquist and Nichols: the model, and points with their bounds; where there is no model they are
+// joined in the order of frequency by straight lines.
 import { letters } from "./chart.js";
 import { nicholsBound } from "./contours.js";
 import { ink, look } from "./looks.js";
@@ -58,17 +59,20 @@ function bounds(sheet, { name, curve, x, y, db, deg }) {
 }
 
 /** @param {Sheet} sheet @param {Traced} traced */
-function path({ ctx, px, u, bode }, { name, x, y, deg }) {
-  const model = name === "model";
+function path({ ctx, px, u, bode }, { name, path, deg }) {
+  if (!path) return;
+  const model = name === "model",
+    x = Array.from(path.x),
+    { y } = path;
   ctx.strokeStyle = ink(name);
   // Thin: between the lines of a measurement nothing is known.
-  ctx.lineWidth = (model ? 1.8 : bode.few ? 0.8 : 1.4) * px;
+  ctx.lineWidth = (model ? 1.8 : 0.8) * px;
   ctx.setLineDash(look(name).dash.map((d) => d * px));
   ctx.beginPath();
   let open = false;
   for (const [i, v] of x.entries()) {
     const known = Number.isFinite(v + y[i]),
-      jump = bode.view.wrapped && i > 0 && Math.abs(deg[i] - deg[i - 1]) > 180;
+      jump = bode.view.wrapped && i > 0 && Math.abs(model ? x[i] - x[i - 1] : deg[i] - deg[i - 1]) > 180;
     if (known) open && !jump ? ctx.lineTo(across(u, v), up(u, y[i])) : ctx.moveTo(across(u, v), up(u, y[i]));
     open = known;
   }

@@ -2,7 +2,7 @@
 // What belongs to the open loop in the planes of Nyquist and Nichols: −1, circles and contours of the closed loop, margins.
 import { circleS, circleT, nicholsT } from "./contours.js";
 import { tr } from "./language.js";
-import { baseOf, label, line, marksOf, paintOf } from "./marks.js";
+import { baseOf, label, line, marksOf, NARROW, paintOf } from "./marks.js";
 import { colour } from "./theme.js";
 import { plain } from "./words.js";
 
@@ -29,6 +29,7 @@ export const LEVELS_DB = [12, 6, 3, 1, 0, -1, -3, -6, -12, -20];
 const POINTS = 361,
   ROOM_PX = 62,
   ROW_PX = 16,
+  ROWS = 24, // of words that are tried for a place without a curve
   WORDS_PX = 14; // below the critical point
 /** Contours of |T|, as in `nicholsT`; open ones from left to right. */
 const CONTOURS = LEVELS_DB.map((level) => {
@@ -229,10 +230,33 @@ function ringed(sheet, x, y, mark, below) {
   ctx.stroke();
   // One that is not visible is named at the edge beside which it is.
   const text = inside(u, x, y) ? words : tr("{margin} at {hz} Hz", { margin: words, hz: plain(hz, 3) });
-  const at = Math.min(left + width, Math.max(left, x));
-  let row = Math.min(top + height - ROW_PX * px, Math.max(top, y + below * px));
-  const step = row > top + height / 2 ? -ROW_PX : ROW_PX;
-  while (taken.some(([, b]) => Math.abs(b - row) < ROW_PX * 0.9 * px)) row += step * px;
-  taken.push([at, row]);
-  label(sheet, text, at, row, paintOf(mark));
+  if (width < NARROW * px) return; // the words are below the plot
+  const wide = ctx.measureText(text).width + 8 * px,
+    tall = 15 * px,
+    first = Math.min(top + height - ROW_PX * px, Math.max(top + tall / 2, y + below * px));
+  for (let i = 0; i < ROWS; i++) {
+    const row = first + (i % 2 ? 1 : -1) * Math.ceil(i / 2) * ROW_PX * px;
+    for (const at of [x + 6 * px, x - wide - 6 * px]) {
+      const start = Math.min(left + width - wide, Math.max(left, at)),
+        box = { left: start, top: row - tall / 2, right: start + wide, bottom: row + tall / 2 };
+      if (box.top < top || box.bottom > top + height || covered(sheet, box)) continue;
+      if (taken.some(([a, b]) => a > box.left - wide && a < box.right && Math.abs(b - row) < ROW_PX * 0.9 * px))
+        continue;
+      taken.push([start, row]);
+      label(sheet, text, start - 6 * px, row, paintOf(mark));
+      return;
+    }
+  }
+}
+
+/** Whether a curve is in a box. @param {Sheet} sheet @param {import("./marks.js").Box} box */
+function covered({ u, plane }, box) {
+  return plane.traced.some(({ x, y, path }) =>
+    [{ x, y }, ...(path ? [path] : [])].some((all) =>
+      Array.from(all.x).some((v, i) => {
+        const [a, b] = [across(u, v), up(u, all.y[i])];
+        return a > box.left && a < box.right && b > box.top && b < box.bottom;
+      }),
+    ),
+  );
 }

@@ -38,6 +38,13 @@ function where(frame, schedule) {
   return tr("at {time}, {place}", { time, place });
 }
 
+/** The time of the fit, where it is not that of the response. @param {Found} found */
+function fitted({ measured, model }) {
+  const timeS = model?.frame?.timeS[0];
+  if (timeS === undefined || timeS === measured?.frame?.timeS[0]) return "";
+  return tr("fitted model at {time}", { time: moment(timeS, true) });
+}
+
 /**
  * @param {Found} found
  * @param {Bode} bode
@@ -129,7 +136,7 @@ export function readout(host, hz, found, schedule, bode) {
   const words = bode.operation
     ? tr("bounds: 95 %; the errors of A and B are taken as independent")
     : frame
-      ? tr("{where}; bounds: 95 %", { where: where(frame, schedule) })
+      ? [tr("{where}; bounds: 95 %", { where: where(frame, schedule) }), fitted(found)].filter(Boolean).join("; ")
       : tr("no response yet");
   host.replaceChildren(
     element(

@@ -96,6 +96,9 @@ export function row(run, actions) {
   );
 }
 
+/** A long name is broken between its words. @param {string} name */
+const breakable = (name) => name.split(/(?<=[_.])/).flatMap((word, i) => (i ? [element("wbr"), word] : [word]));
+
 /**
  * @param {number} column
  * @param {string | HTMLElement} text
@@ -134,8 +137,8 @@ function nameCell(run, actions) {
   );
   const broken = run.state === "broken";
   const name = broken
-    ? element("span", { class: "name" }, run.name)
-    : element("a", { href: pageOf(run.name), class: "name", "data-key": `open-${run.name}` }, run.name);
+    ? element("span", { class: "name" }, ...breakable(run.name))
+    : element("a", { href: pageOf(run.name), class: "name", "data-key": `open-${run.name}` }, ...breakable(run.name));
   const what = run.state === "finished" ? "" : state(run) + (broken ? `: ${worded(run.said)}` : "");
   const found = element("th", { scope: "row" }, name, ...tags);
   if (what) found.append(element("small", { class: `state ${run.state}` }, what));

@@ -2,6 +2,7 @@
 // One parameter over time, thinned if it is long.
 
 /** @import { Sent, Trend } from "./messages.js" */
+/** @typedef {{t: number, v: number, s: number, status: string}} Row Time, value, sigma and status. */
 
 const POINTS_MAX = 1500;
 /** @param {Sent} v */
@@ -21,6 +22,13 @@ export class Series {
     this.s = [];
     /** @type {string[]} */
     this.status = [];
+    /** The row of the fit that is drawn. @type {Row | null} */
+    this.shown = null;
+  }
+
+  /** The row of the fit that is drawn. @param {Trend} trend with one row */
+  show({ time_s: [t], value: [v], sigma: [s], status: [status] }) {
+    this.shown = { t, v: number(v), s: number(s), status };
   }
 
   /**
@@ -47,30 +55,5 @@ export class Series {
     this.v = this.v.filter(kept);
     this.s = this.s.filter(kept);
     this.status = this.status.filter(kept);
-  }
-
-  /**
-   * Index of the row nearest to a time; without a time, of the newest row.
-   *
-   * @param {number} timeS
-   */
-  at(timeS) {
-    if (!Number.isFinite(timeS)) return this.t.length - 1;
-    let best = 0;
-    this.t.forEach((t, i) => {
-      if (Math.abs(t - timeS) < Math.abs(this.t[best] - timeS)) best = i;
-    });
-    return best;
-  }
-
-  /**
-   * The same, but without a time the newest row with a value.
-   *
-   * @param {number} timeS
-   */
-  known(timeS) {
-    let at = this.at(timeS);
-    if (!Number.isFinite(timeS)) while (at > 0 && !Number.isFinite(this.v[at])) at--;
-    return at;
   }
 }

@@ -60,7 +60,7 @@ export class TimeZoom {
   // Two clicks show all, at the time that was shown before the first of them.
   back() {
     if (this.before !== null) this.timeline.go(this.before);
-    else if (this.timeline.atS !== null) this.timeline.toggle();
+    else if (this.timeline.atS !== null) this.timeline.newest();
     this.reset();
   }
 

@@ -10,7 +10,7 @@ import { drawingPicture } from "./picture.js";
 import { between } from "./rows.js";
 import { colour } from "./theme.js";
 import { timeAxis, timeLabel } from "./time-ticks.js";
-import { linesInAddress, rememberLines, toggle } from "./tracked_lines.js";
+import { linesInAddress, linesNear, rememberLines, toggle } from "./tracked_lines.js";
 import { hertz, label, mark } from "./words.js";
 
 /** @import { Chart } from "./chart.js" */
@@ -37,8 +37,9 @@ export class Tracking {
     this.lines = [];
     /** @type {number[]} indices of the tracked lines, in the order of their colours */
     this.chosen = [];
-    /** @type {Map<string, number[]>} the same of every axis */
+    /** The same of every axis, once a person has chosen them. @type {Map<string, number[]>} */
     this.choices = new Map();
+    this.key = "";
     /** @type {Named} */
     this.schedule = { name: "", unit: "" };
     /** @type {History | null} */
@@ -61,12 +62,30 @@ export class Tracking {
     this.schedule = schedule;
     this.rows = null;
     // Each axis has its own choice, independent of the lines of others.
-    const key = JSON.stringify([facts.axis, this.lines]);
-    this.chosen = this.choices.get(key) ?? linesInAddress(this.lines);
-    this.choices.set(key, this.chosen);
-    rememberLines(this.lines, this.chosen);
+    this.key = JSON.stringify([facts.axis, this.lines]);
+    const asked = this.choices.get(this.key) ?? linesInAddress(this.lines);
+    this.chosen = asked.length ? asked : linesNear(this.lines, []);
+    if (asked.length) this.keep();
     this.drawChips();
     this.build();
+  }
+
+  // The choice of a person.
+  keep() {
+    this.choices.set(this.key, this.chosen);
+    rememberLines(this.lines, this.chosen);
+  }
+
+  /** The lines that matter, unless a person has chosen others. @param {number[]} places Hz */
+  suggest(places) {
+    const lines = linesNear(this.lines, places);
+    if (this.choices.has(this.key) || lines.join() === this.chosen.join()) return;
+    this.chosen = lines;
+    this.drawChips();
+    const first = this.chips.querySelector("[aria-pressed=true]");
+    if (first instanceof HTMLElement) this.chips.scrollLeft = first.offsetLeft - this.chips.offsetLeft - 3;
+    this.build();
+    if (this.rows) this.draw(this.rows, this.fromS, this.toS);
   }
 
   // Show nothing until the next `begin`.
@@ -106,7 +125,7 @@ export class Tracking {
   /** @param {number} i */
   toggle(i) {
     toggle(this.chosen, i);
-    rememberLines(this.lines, this.chosen);
+    this.keep();
     this.drawChips();
     this.chips.querySelectorAll("button")[i]?.focus();
     this.build();

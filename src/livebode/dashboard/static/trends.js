@@ -49,10 +49,16 @@ export class Trends {
 
   /** @param {Trend[]} list */
   begin(list) {
-    for (const item of this.items.values()) item.made?.destroy();
-    this.items.clear();
+    const before = this.items;
+    for (const item of before.values()) item.made?.destroy();
+    this.items = new Map();
     this.host.replaceChildren(element("p", { class: "empty" }, this.empty));
     for (const trend of list) this.take(trend);
+    // The drawn model is that of the fit before, until the next one arrives.
+    for (const [key, item] of this.items) {
+      item.shown = before.get(key)?.shown ?? null;
+      write(item);
+    }
     this.draw();
   }
 
@@ -63,11 +69,24 @@ export class Trends {
    */
   take(trend) {
     if (!this.wanted(trend)) return;
+    const item = this.itemOf(trend);
+    item.take(trend);
+    item.dirty = true;
+  }
+
+  /** @param {Trend} trend */
+  itemOf(trend) {
     const key = `${trend.model}\0${trend.name}`;
     const item = this.items.get(key) ?? new Item(trend);
     this.items.set(key, item);
-    item.take(trend);
-    item.dirty = true;
+    return item;
+  }
+
+  /** The values of the fit that is drawn. @param {Trend[]} list one row of each parameter */
+  show(list) {
+    for (const item of this.items.values()) item.shown = null;
+    for (const trend of list) if (this.wanted(trend)) this.itemOf(trend).show(trend);
+    for (const item of this.items.values()) write(item);
   }
 
   /** @param {Item} item */
@@ -112,8 +131,8 @@ export class Trends {
     );
   }
 
-  // Draw the parameters that changed, each with its value at a time, or the newest.
-  draw(atS = NaN, span = this.span) {
+  // Draw the parameters that changed.
+  draw(span = this.span) {
     if (this.host.closest("[hidden]")) return;
     if (span !== this.span) this.refresh();
     this.span = span;
@@ -124,9 +143,6 @@ export class Trends {
       item.made ??= this.build(item);
       low = Math.min(low, item.t[0] ?? low);
       high = Math.max(high, item.t.at(-1) ?? high);
-      const at = item.known(atS);
-      const words = item.name.endsWith("_frequency") ? "" : bounded(item.v[at], item.s[at], item.unit);
-      item.words.textContent = Number.isFinite(item.v[at]) ? words : worded(item.status[at] ?? "");
       if (!item.dirty) continue;
       item.dirty = false;
       /** @param {number} v */
@@ -143,6 +159,12 @@ export class Trends {
   refresh() {
     for (const item of this.items.values()) item.dirty = true;
   }
+}
+
+/** Its value in words. @param {Item} item */
+function write({ name, unit, shown, words }) {
+  const value = !shown || name.endsWith("_frequency") ? "" : bounded(shown.v, shown.s, unit);
+  words.textContent = shown && !Number.isFinite(shown.v) ? worded(shown.status) : value;
 }
 
 /**

@@ -26,7 +26,8 @@ export function lamp({ up, facts, health }, { live, growing }, paused) {
   if (paused) return [tr("paused"), "paused"];
   if (!live) return growing ? [tr("being recorded"), ""] : [tr("recorded"), ""];
   if (!health) return [tr("waiting for data"), "stale"];
-  const { source, stale, silent_s: silentS = 0, backlog_s: backlogS } = health;
+  const { source, stale, silent_s: silentS = 0, backlog_s: backlogS, ending } = health;
+  if (ending) return [tr("completing the record"), ""];
   if (source && !source.connected) return [tr("not connected, silent for {time}", { time: seconds(silentS) }), "stale"];
   if (stale) return [tr("silent for {time}", { time: seconds(silentS) }), "stale"];
   if (backlogS) return [tr("{time} behind", { time: seconds(backlogS) }), "stale"];
@@ -104,7 +105,7 @@ const SENTENCES = {
   suppressed: (v) => tr("Not assessed: not ready since {time}", { time: sinceOf(v) }),
   "not-monitored": (v) => tr("Not monitored since {time}: too little is known of the machine", { time: sinceOf(v) }),
   healthy: () => tr("Healthy: no difference from the baseline"),
-  "no-baseline": () => tr("Not assessed: no baseline"),
+  "no-baseline": () => tr("No baseline: not monitored"),
   "not-judged": () => tr("Not assessed: the baseline does not cover what the machine did"),
   "not-begun": () => tr("Not assessed: waiting for the first samples"),
 };

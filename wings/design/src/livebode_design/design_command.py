@@ -20,7 +20,7 @@ def design_command(
         "design"
     ),
     to: Annotated[
-        list[str] | None, typer.Option(metavar="FORMAT", help="csv, npz, mat, h or st. \\[default: all]")
+        list[str] | None, typer.Option(metavar="FORMAT", help="csv, wav, npz, mat, h or st. \\[default: all]")
     ] = None,
     name: Annotated[str, typer.Option(help="Name of the excitation; also of its files.")] = "excitation",
     band: Annotated[

@@ -219,10 +219,12 @@ class Experiment(BaseModel):
 
     def left_out(self, design: Design) -> dict[str, str]:
         """The formats that are not possible for a design, with the reason."""
-        window = design.waveform.lines.window
-        if window <= BLOCK_PERIOD_MAX:
-            return {}
-        return {".st": f"no .st: its {window} samples are more than the {BLOCK_PERIOD_MAX} of a PLC's table"}
+        lines, reasons = design.waveform.lines, {}
+        if lines.window > BLOCK_PERIOD_MAX:
+            reasons[".st"] = f"no .st: its {lines.window} samples are more than the {BLOCK_PERIOD_MAX} of a PLC's table"
+        if lines.rate_hz % 1:
+            reasons[".wav"] = f"no .wav: {lines.rate_hz!r} Hz is not a whole number of samples per second"
+        return reasons
 
     def loop_tables(self) -> dict[str, Any]:
         """[loop] of the axis.toml, as in docs/reference/configuration.md."""

@@ -157,7 +157,8 @@ def _schema_text() -> str:
 def _without_scipy() -> dict[str, str]:
     if find_spec("scipy") is not None:
         return {}
-    return {".mat": f"no .mat, because SciPy is not installed; run {install_command('analysis')}"}
+    reason = f"because SciPy is not installed; run {install_command('analysis')}"
+    return {ending: f"no {ending}, {reason}" for ending in (".mat", ".wav")}
 
 
 def described(experiment: str | PathLike[str] | Mapping[str, Any], over: Mapping[str, Any]) -> DescribedExperiment[Any]:

@@ -1,4 +1,4 @@
-"""Files of an excitation by suffix: CSV, NumPy, MATLAB, a C header, a function block for a PLC."""
+"""Files of an excitation by suffix: CSV, WAV, NumPy, MATLAB, a C header, a function block for a PLC."""
 
 from __future__ import annotations
 
@@ -111,6 +111,26 @@ def write_struct(path: Path, struct: Mapping[str, Any], name: str) -> None:
         file.write(b"MATLAB 5.0 MAT-file, written by livebode".ljust(_TEXT_BYTES))
 
 
+def write_wav(path: Path, waveform: Waveform, name: str) -> None:  # noqa: ARG001
+    """One channel of 32-bit floats in N m, so that 1.0 is 1 N m, for a generator that repeats it.
+
+    A file of this form has a whole number of samples per second, and no name.
+    """
+    rate_hz = waveform.lines.rate_hz
+    if rate_hz % 1:
+        raise DesignError(
+            "format-impossible",
+            f"a WAV file has a whole number of samples per second, and the rate is {rate_hz!r} Hz",
+            "choose another format",
+            argument="suffixes",
+            rate_hz=rate_hz,
+        )
+    with needing("SciPy", "analysis", "a design as a WAV file"):
+        from scipy.io import wavfile
+
+    wavfile.write(path, int(rate_hz), waveform.samples.astype(np.float32))
+
+
 def write_c_header(path: Path, waveform: Waveform, name: str) -> None:
     """``name[NAME_SAMPLES]`` in N m and ``name_bins[NAME_LINES]``; values in hexadecimal, so exactly the doubles.
 
@@ -208,6 +228,7 @@ def _nearest(name: str, most: int, keywords: frozenset[str]) -> str:
 
 FORMATS: Mapping[str, Callable[[Path, Waveform, str], None]] = {
     ".csv": write_csv,
+    ".wav": write_wav,
     ".npz": write_npz,
     ".mat": write_mat,
     ".h": write_c_header,

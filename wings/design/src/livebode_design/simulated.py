@@ -1,4 +1,4 @@
-"""A simulated controller in real time: the belt axis of an experiment, on which `livebode measure --simulated` plays."""
+"""A simulated controller in real time: the belt axis of an experiment, on which `measure --simulated` plays."""
 
 from __future__ import annotations
 

@@ -8,11 +8,12 @@ from math import isfinite
 import numpy as np
 
 from livebode.analysis import MARGINS
-from livebode.core import INTERVAL_FACTOR, Answer, with_bound
-from livebode.language import number, quantity_name, tr, worded
+from livebode.core import INTERVAL_FACTOR, Answer, Response, with_bound
+from livebode.language import Message, number, quantity_name, tr, worded
 from livebode_reports.limits import answer_of
 from livebode_reports.parameter_track import Track
 from livebode_reports.report_data import ReportData
+from livebode_reports.wording import decibels
 
 _STIFFNESS = ("N/m", "N m/rad")
 _ANSWERS_MAX = 6
@@ -28,14 +29,28 @@ def answers(of: ReportData) -> tuple[Answer, ...]:
     limited = tuple(answer_of(result) for result in of.accepted)
     asked = {result.limit.quantity for result in of.accepted}
     quantities = [quantity for quantity in _quantities(of) if _as_limit(quantity) not in asked]
+    if not quantities and not limited:
+        return tuple(_peak(of.of.response))
     return (*limited, *(Answer(quantity_name(name), value) for name, _, value in by_importance(quantities)))
+
+
+def _peak(mean: Response) -> Iterator[Answer]:
+    """Without a model, the largest line that is above both its neighbours by more than the bounds of both."""
+    known = np.flatnonzero(mean.valid & np.isfinite(mean.bound()))
+    f, size, radius = mean.frequency_hz[known], np.abs(mean.value[known]), mean.bound()[known]
+    above = size - radius > np.maximum(np.append((size + radius)[1:], np.inf), np.append(np.inf, (size + radius)[:-1]))
+    if above.any():
+        i = int(np.flatnonzero(above)[np.argmax(size[above])])
+        level = with_bound(decibels(size[i]), -decibels(1 - radius[i] / size[i]))
+        name = tr("peak between {low:g} and {high:g} Hz", low=f[i - 1], high=f[i + 1])
+        yield Answer(name, tr("{level} dB at {at:g} Hz", level=" ± ".join(level), at=f[i]))
 
 
 def about_answers(of: ReportData) -> str:
     """What the bounds of the answers cover."""
-    if of.of.moved:
+    if of.of.moved and _fits(of):
         return tr("The axis moved: ranges of 90 % of the fits over the run. ± covers 95 % of the errors of one fit.")
-    return worded(of.fit.about_bounds) + "." if of.fit is not None else ""
+    return worded(of.fit.about_bounds if of.fit is not None else Message("± covers 95 %")) + "."
 
 
 def by_importance(quantities: list[Quantity]) -> list[Quantity]:
@@ -62,10 +77,13 @@ def _as_limit(quantity: Quantity) -> str:
     return f"{name}_hz" if unit == "Hz" else name
 
 
+def _fits(of: ReportData) -> list[Track]:
+    return [track for track in of.tracks.values() if track.model != MARGINS]
+
+
 def _quantities(of: ReportData) -> Iterator[Quantity]:
-    tracks = [track for track in of.tracks.values() if track.model != MARGINS]
-    if of.of.moved and tracks:
-        yield from _ranges(tracks[0])
+    if of.of.moved and _fits(of):
+        yield from _ranges(_fits(of)[0])
     elif of.fit is not None:
         for name, value, bound, unit in of.fit.rows():
             if bound > 0:  # of what is fixed nothing was measured

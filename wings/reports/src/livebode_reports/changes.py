@@ -36,11 +36,6 @@ class QuantityChange:
     seen: float
 
     @property
-    def words(self) -> str:
-        """The name without underscores."""
-        return self.name.replace("_", " ")
-
-    @property
     def amount(self) -> float:
         """After minus before."""
         return self.after[0] - self.before[0]
@@ -62,14 +57,12 @@ class Changes:
 
 
 def changes(of: RunDifferences) -> Changes:
-    """Fit the same model to the compared response of each run, and compute the margins of the described loops."""
+    """Fit the same model to the compared response of each run, and compute the margins of the described loops.
+
+    The model is that of the [fit] of a run; without one it follows from what the channels measure.
+    """
     own = [recorded_configuration(run.summary) for run in of.runs]
-    section = next((s["fit"] for s in own if "fit" in s), None)
-    if section is None:
-        words = Message(
-            "No parameters: neither run has a [fit] section (`livebode inspect --out axis.toml --fit auto` writes one)."
-        )
-        return Changes((), words, (), Message("No margins: they need a fit."))
+    section: dict[str, object] = next((s["fit"] for s in own if "fit" in s), {})
     model = FitSection.model_validate(section)
     try:
         fits = [
@@ -82,7 +75,11 @@ def changes(of: RunDifferences) -> Changes:
         if fit.status != "ok":
             words = Message("No parameters: the fit to {run} was rejected: {why}.", run=run.path.name, why=fit.sentence)
             return Changes((), words, (), Message("No margins: they need a fit."))
-    rows = [{name: (value, bound, unit) for name, value, bound, unit in fit.rows()} for fit in fits]
+    # A quality factor is the damping ratio again.
+    rows = [
+        {name: (value, bound, unit) for name, value, bound, unit in fit.rows() if not name.endswith("_q")}
+        for fit in fits
+    ]
     quantities = _table(rows)
     words = Message(
         "The {model} model, fitted to the compared responses at {lines} lines.",
@@ -136,6 +133,21 @@ def _table(rows: list[dict[str, tuple[float, float, str]]]) -> tuple[QuantityCha
         )
         for name in names
     )
+
+
+_STIFFNESS = ("N/m", "N m/rad")
+_POLES = ("resonance", "antiresonance")
+
+
+def by_importance(table: tuple[QuantityChange, ...]) -> tuple[QuantityChange, ...]:
+    """Stiffnesses, the other parameters, and what follows from them: resonances, then dampings; those changed first."""
+
+    def rank(change: QuantityChange) -> tuple[bool, int]:
+        derived = change.name.startswith(_POLES) or change.name == "inertia_ratio"
+        rank = 0 if change.unit in _STIFFNESS else 1 if not derived else 2 if change.unit == "Hz" else 3
+        return not change.significant, rank
+
+    return tuple(sorted(table, key=rank))
 
 
 def percent(change: QuantityChange, amount: float) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from math import isfinite
@@ -15,13 +15,25 @@ import numpy as np
 
 from livebode.analysis import RunMean
 from livebode.configuration import ReportSection, recorded_configuration, recorded_report
-from livebode.core import TONES, Document, Finding, Paragraph, Part, Picture, PrintedTable, Section, with_bound
+from livebode.core import (
+    TONES,
+    Answer,
+    Document,
+    Finding,
+    Paragraph,
+    Part,
+    Picture,
+    PrintedTable,
+    Section,
+    counted,
+    with_bound,
+)
 from livebode.estimates import kind_of
-from livebode.language import Message, number, recorded, tr, trn, worded
+from livebode.language import Message, number, quantity_name, recorded, tr, trn, worded
 from livebode.records import RunRecord, event_counts, read_summary
 from livebode_reports import first_page
-from livebode_reports.changes import Changes, QuantityChange, changes, percent
-from livebode_reports.comparison_verdict import detectable, verdict
+from livebode_reports.changes import Changes, QuantityChange, by_importance, changes, percent
+from livebode_reports.comparison_verdict import detectable, in_percent, most_certain, parameters, verdict
 from livebode_reports.difference import ALPHA, Difference, RunDifferences, compare
 from livebode_reports.kinds import rule_of
 from livebode_reports.limits import limits
@@ -29,7 +41,7 @@ from livebode_reports.report_data import entry_title, read, written
 from livebode_reports.wording import decibels, pairs, polar, polar_phrase, signed
 
 TONES_OF_A_COMPARISON = {**TONES, "ok": Message("no difference shown")}
-_LINES_SHOWN, _PLACES_SHOWN = 80, 40
+_LINES_SHOWN, _PLACES_SHOWN, _ANSWERS_MAX = 10, 40, 5
 
 
 def comparison_of(before: Path, after: Path) -> Any:
@@ -79,20 +91,24 @@ class Comparison:
 
     @property
     def tables(self) -> tuple[str, ...]:
-        """Tables for the terminal: ratio at each line, changes of parameters and margins."""
+        """Tables for the terminal: changes of parameters and margins, and the ten lines that differ most certainly."""
         d = self.differences.overall
-        rows = [
-            f"{f:>10g} Hz {_ratio_columns(ratio, bound)}{'  differs' * bool(on)}"
-            for f, ratio, bound, on in zip(d.before.lines.frequency_hz, d.ratio.tolist(), d.bound.tolist(), d.differs)
-        ]
-        more = len(rows) - _LINES_SHOWN
-        lines = "\n".join(rows[:_LINES_SHOWN] + [f"and {more} more lines; --json prints all"] * (more > 0))
         changed = [
-            f"  {c.words:22}{c.before[0]:>12.5g} → {c.after[0]:<12.5g}{c.amount:>+12.3g} ± {c.bound:<10.2g}{c.unit}"
-            + "  changed" * c.significant
-            for c in (*self.changes.parameters, *self.changes.margins)
+            f"  {quantity_name(c.name):28}{c.before[0]:>12.5g} → {c.after[0]:<12.5g}{c.amount:>+12.3g} ± "
+            f"{c.bound:<10.2g}{c.unit}" + "  changed" * c.significant
+            for table in (self.changes.parameters, self.changes.margins)
+            for c in by_importance(table)
         ]
-        return tuple(filter(None, (lines, "\n".join(changed))))
+        differing = most_certain(d)
+        rows = [
+            f"{d.before.lines.frequency_hz[i]:>10g} Hz {_ratio_columns(complex(d.ratio[i]), float(d.bound[i]))}"
+            for i in sorted(differing[:_LINES_SHOWN])
+        ]
+        if rows:
+            rows.insert(0, "after/before at the lines that differ most certainly; ± covers all lines with 95 %")
+        if (more := len(differing) - _LINES_SHOWN) > 0:
+            rows.append(f"and {counted(more, 'more line')} that differ; --json prints all lines, --out FILE a report")
+        return tuple(filter(None, ("\n".join(changed), "\n".join(rows))))
 
     def plain(self) -> dict[str, Any]:
         """For JSON."""
@@ -133,7 +149,7 @@ class Comparison:
         runs = header.machine or tr("{before} and {after}", before=run_name(before), after=run_name(other))
         title = " · ".join(filter(None, (runs, entry_title(other))))
         sections = [
-            limits(accepted), self.response(), self._places(), self._parameters(), self.how(), self.events(),
+            limits(accepted), self._parameters(), self.differing(), self._places(), self.how(), self.events(),
         ]  # fmt: skip
         return Document(
             kind=tr("Before and after"),
@@ -144,14 +160,41 @@ class Comparison:
             foot=" · ".join(filter(None, (title, header.serial_number, header.company))),
             heading=tr("What changed"),
             tones=TONES_OF_A_COMPARISON,
-            result=first_page.result(self.sentences, accepted),
+            answers=self._answers(),
+            about_answers=tr("Change from before to after. ± covers all changes of the table together with 95 %."),
+            result=first_page.result(tuple(self._in_short()), accepted),
             picture=self.picture(),
             signatures=first_page.signatures(header),
-            appendix=self.appendix() if appendix else (),
+            appendix=(self.response(), *(self.appendix() if appendix else ())),
             logo=first_page.logo_of(header),
             paper=header.paper,
             made=made,
         )
+
+    def _in_short(self) -> Iterator[Finding]:
+        """The verdict without the changes that the answers have."""
+        answered = {finding.text for finding in parameters(self.changes.parameters)}
+        for finding in self.sentences:
+            if finding.text in answered:
+                changed, every = sum(c.significant for c in self.changes.parameters), len(self.changes.parameters)
+                text = trn(
+                    "{n:,} parameter of {all} changed.", "{n:,} parameters of {all} changed.", changed, all=every
+                )  # fmt: skip
+                yield Finding(finding.tone, text)
+            else:
+                yield finding
+
+    def _answers(self) -> tuple[Answer, ...]:
+        """The changes of the most important parameters."""
+        rows = by_importance(self.changes.parameters)[:_ANSWERS_MAX]
+        return tuple(
+            Answer(
+                quantity_name(c.name), in_percent(c),
+                f"{with_bound(*c.before)[0]} → {with_bound(*c.after)[0]} {worded(c.unit)}".rstrip(),
+                "differs" if c.significant else "ok",
+            )
+            for c in rows
+        )  # fmt: skip
 
     def appendix(self) -> tuple[Section, ...]:
         """The settings that differ, and what the report does not contain."""
@@ -172,7 +215,7 @@ class Comparison:
             )),
             (tr("responses"), " / ".join(number(a.count, ",") for a in self.differences.averages)),
             (tr("compared at"), _span(self.differences)),
-            (tr("smallest detectable change"), detectable(*(c.differences.overall for c in (self, *others)))),
+            (tr("smallest detectable change of a line"), detectable(*(c.differences.overall for c in (self, *others)))),
         ]  # fmt: skip
         return [(name, value) for name, value in rows if value]
 
@@ -203,6 +246,16 @@ class Comparison:
 
     def response(self) -> Section:
         """Both responses and their ratio at each line."""
+        return Section(tr("Frequency response"), (self._lines(),))
+
+    def differing(self) -> Section | None:
+        """The lines that differ most certainly; None if none differs."""
+        differing = most_certain(self.differences.overall)
+        if not differing.size:
+            return None
+        return Section(tr("Lines that differ"), (self._lines(sorted(differing[:_LINES_SHOWN].tolist())),))
+
+    def _lines(self, indices: Sequence[int] | None = None) -> PrintedTable:
         d = self.differences.overall
         radius = [r.bound() for r in (d.before, d.after)]
         rows = [
@@ -213,18 +266,21 @@ class Comparison:
                 tr("yes") if d.differs[i] else tr("no"),
             )
             for i, f in enumerate(d.before.lines.frequency_hz)
+            if indices is None or i in indices
         ]  # fmt: skip
-        step = -(-len(rows) // _LINES_SHOWN)
-        shown = [row for i, row in enumerate(rows) if i % step == 0 or d.differs[i]]
         note = tr("± of the ratio: 95 % at all lines together.")
-        if step > 1:
-            note = tr("Only some of the lines are shown, and all that differ.") + " " + note
+        if indices is not None and (more := int(d.differs.sum()) - len(indices)) > 0:
+            text = trn(
+                "{n:,} more line that differs is in the table of all lines, at the end.",
+                "{n:,} more lines that differ are in the table of all lines, at the end.",
+                more,
+            )
+            note = f"{text} {note}"
         headings = (
             "Hz", tr("before dB"), "±", tr("after dB"), "±", tr("ratio dB"), "±", tr("ratio °"), "±",
             tr("detectable %"), "p", tr("differs"),
         )  # fmt: skip
-        table = PrintedTable(headings, tuple(shown), tuple(range(11)), note)
-        return Section(tr("Frequency response"), (table,))
+        return PrintedTable(headings, tuple(rows), tuple(range(11)), note)
 
     def _places(self) -> Section | None:
         places = self.differences.places
@@ -276,7 +332,9 @@ class Comparison:
                     "± of before and after covers 95 % each; ± of the change covers the whole table together "
                     "(Bonferroni)."
                 )
-                parts.append(PrintedTable(headings, tuple(_row(c) for c in table), (1, 2, 3, 4, 6, 7, 8, 9), note))
+                parts.append(
+                    PrintedTable(headings, tuple(_row(c) for c in by_importance(table)), (1, 2, 3, 4, 6, 7, 8, 9), note)
+                )
         return Section(tr("Parameters and margins"), tuple(parts))
 
     def events(self) -> Section:
@@ -339,7 +397,7 @@ def _of(lines: set[tuple[str, str]], key: tuple[str, ...]) -> str:
 def _row(c: QuantityChange) -> tuple[str, ...]:
     changed = with_bound(c.amount, c.bound)
     return (
-        worded(c.words), *with_bound(*c.before), *with_bound(*c.after), c.unit, *changed,
+        quantity_name(c.name), *with_bound(*c.before), *with_bound(*c.after), c.unit, *changed,
         number(percent(c, c.amount), "+.2g"), _seen(percent(c, c.seen) / 100), tr("yes") if c.significant else tr("no"),
     )  # fmt: skip
 

@@ -8,13 +8,14 @@ from math import isfinite, log10
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Finding, Tone
-from livebode.language import listed, number, tr, trn, worded
-from livebode_reports.changes import Changes, QuantityChange, percent
+from livebode.core import Finding, Tone, with_bound
+from livebode.language import number, quantity_name, tr, trn, worded
+from livebode_reports.changes import Changes, QuantityChange, by_importance, percent
 from livebode_reports.difference import Difference, PlaceDifference, RunDifferences
 from livebode_reports.events import EventSummary, alarms
-from livebode_reports.wording import polar_phrase
+from livebode_reports.wording import polar_phrase, share, signed
 
+_CHANGES_MAX = 6
 _URGENT: tuple[Tone, ...] = ("alarm", "differs", "check", "open", "ok")
 
 
@@ -23,10 +24,10 @@ def verdict(differences: RunDifferences, changes: Changes) -> tuple[Finding, ...
     findings = [
         *_alarms(differences),
         *(Finding("check", worded(text)) for text in differences.warnings),
+        *parameters(changes.parameters),
+        *_margins(changes.margins),
         _overall(differences.overall),
         *_by_place(differences.places),
-        *_parameters(changes.parameters),
-        *_margins(changes.margins),
     ]
     return tuple(sorted(findings, key=lambda finding: _URGENT.index(finding.tone)))
 
@@ -48,13 +49,12 @@ def _overall(d: Difference) -> Finding:
     if not d.differs.any():
         text = tr("No line differs by more than chance ({m} tested together; {seen}).", m=d.m, seen=_seen([d]))
         return Finding("ok", text)
-    f, worst = d.before.lines.frequency_hz, int(np.nanargmin(d.p))
+    worst = int(most_certain(d)[0])
     words = trn(
-        "{n:,} line of {m} differs: {lines}.", "{n:,} lines of {m} differ: {lines}.", int(d.differs.sum()),
-        m=d.m, lines=_hz(f[d.differs]),
+        "{n:,} line of {m} differs: at {at:g} Hz by {ratio}.",
+        "{n:,} lines of {m} differ, most certainly at {at:g} Hz: {ratio}.", int(d.differs.sum()), m=d.m,
+        at=d.before.lines.frequency_hz[worst], ratio=polar_phrase(complex(d.ratio[worst]), float(d.bound[worst])),
     )  # fmt: skip
-    ratio = polar_phrase(complex(d.ratio[worst]), float(d.bound[worst]))
-    words += " " + tr("Most certain at {at:g} Hz: {ratio}.", at=f[worst], ratio=ratio)
     return Finding("differs", f"{words} {_ignored(d)}" if d.ignored.any() else words)
 
 
@@ -97,6 +97,11 @@ def _by_place(places: tuple[PlaceDifference, ...]) -> Iterator[Finding]:
     yield Finding("ok", words)
 
 
+def most_certain(d: Difference) -> NDArray[np.intp]:
+    """Indices of the lines that differ, the most certain first."""
+    return np.asarray(sorted(np.flatnonzero(d.differs), key=lambda i: (d.p[i], -abs(d.ratio[i] - 1) / d.bound[i])))
+
+
 def detectable(*each: Difference) -> str:
     """The smallest detectable change of the response, or of several; empty if no line can be compared."""
     seen = np.concatenate([d.seen[np.isfinite(d.p)] for d in each])
@@ -108,54 +113,46 @@ def _seen(places: Sequence[Difference]) -> str:
 
 
 def _sizes(seen: NDArray[np.float64]) -> str:
-    """At every line and at the best line."""
-    least, most = 100 * float(seen.min()), 100 * float(seen.max())
+    """At half of the lines, and the range: one line of an antiresonance does not stand for all."""
+    least, median, most = map(float, np.quantile(seen, (0, 0.5, 1)))
     if most < 1.5 * least:
-        return tr("≥ {most:.2g} %", most=most)
-    return tr("≥ {most:.2g} % at every line, ≥ {least:.2g} % at the best line", most=most, least=least)
+        return tr("≥ {most}", most=share(most, 1))
+    return tr(
+        "≥ {median} at half of the lines ({least} … {most})", median=share(median, 1), least=share(least, 1),
+        most=share(most, 1),
+    )  # fmt: skip
 
 
-def _parameters(table: tuple[QuantityChange, ...]) -> Iterator[Finding]:
-    moved, listing = _changed(table)
-    if moved:
-        text = trn(
-            "{n:,} parameter of {all} changed: {changes}.", "{n:,} parameters of {all} changed: {changes}.", moved,
-            all=len(table), changes=listing,
-        )  # fmt: skip
-        yield Finding("differs", text)
-    elif table:
-        without = tr("No significant change of a parameter.")
-        seen = tr("No significant change of a parameter (detectable: {changes}).", changes=listing)
-        yield Finding("ok", seen if listing else without)
+def parameters(table: tuple[QuantityChange, ...]) -> Iterator[Finding]:
+    """The changes of the parameters, or that none is significant; nothing without parameters."""
+    yield from _about(table, tr("No significant change of a parameter"))
 
 
 def _margins(table: tuple[QuantityChange, ...]) -> Iterator[Finding]:
-    moved, listing = _changed(table)
-    if moved:
-        text = trn(
-            "{n:,} margin of {all} changed: {changes}.", "{n:,} margins of {all} changed: {changes}.", moved,
-            all=len(table), changes=listing,
+    yield from _about(table, tr("No significant change of a margin"))
+
+
+def _about(table: tuple[QuantityChange, ...], unchanged: str) -> Iterator[Finding]:
+    """The changes, the most important first; if there are none, what would have been detected."""
+    ranked = by_importance(table)
+    if changed := [c for c in ranked if c.significant]:
+        together = trn(
+            "± covers the change with 95 %.", "± covers all {n} changes of the table together with 95 %.", len(table)
         )  # fmt: skip
-        yield Finding("differs", text)
-    elif table:
-        without = tr("No significant change of a margin.")
-        seen = tr("No significant change of a margin (detectable: {changes}).", changes=listing)
-        yield Finding("ok", seen if listing else without)
+        listing = "; ".join(f"{quantity_name(c.name)} {in_percent(c)}" for c in changed[:_CHANGES_MAX])
+        yield Finding("differs", f"{listing}. {together}")
+    elif ranked:
+        seen = [
+            f"{quantity_name(c.name)} ≥ {number(percent(c, c.seen), '.2g')} %"
+            for c in ranked[:_CHANGES_MAX] if isfinite(percent(c, c.seen))
+        ]  # fmt: skip
+        text = tr("{none} (detectable: {changes})", none=unchanged, changes="; ".join(seen)) if seen else unchanged
+        yield Finding("ok", f"{text}.")
 
 
-def _changed(table: tuple[QuantityChange, ...]) -> tuple[int, str]:
-    """Number of significant changes with their list; if there are none, the list of the detectable changes."""
-    moved = [c for c in table if c.significant]
-    if moved:
-        return len(moved), "; ".join(
-            f"{worded(c.words)} {number(percent(c, c.amount), '+.2g')} % ± {number(percent(c, c.bound), '.2g')} %"
-            for c in moved[:6]
-        )
-    return 0, "; ".join(
-        f"{worded(c.words)} ≥ {number(percent(c, c.seen), '.2g')} %" for c in table[:6] if isfinite(percent(c, c.seen))
-    )
-
-
-def _hz(frequency_hz: NDArray[np.float64]) -> str:
-    shown = listed(number(f, "g") for f in frequency_hz[:12])
-    return f"{shown}{' …' if len(frequency_hz) > 12 else ''} Hz"
+def in_percent(c: QuantityChange) -> str:
+    """The change with its bound, in percent of the value before; of a value of zero, in its unit."""
+    scale = percent(c, 1.0)
+    unit = "%" if isfinite(scale) else worded(c.unit)
+    text, around = with_bound(*(x * (scale if isfinite(scale) else 1.0) for x in (c.amount, c.bound)))
+    return f"{signed(text)} ± {around} {unit}".rstrip().replace("-", "−")

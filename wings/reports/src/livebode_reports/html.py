@@ -71,7 +71,7 @@ class _Page:
         of = self._of
         rows = "\n".join(
             f'<tr><th scope="row">{_text(a.name)}</th><td class="value">{_text(a.value)}</td>'
-            f"<td>{_text(a.limit)}</td><td{self._tone(a)}</td></tr>"
+            f"<td>{_text(a.beside)}</td><td{self._tone(a)}</td></tr>"
             for a in of.answers
         )
         note = f'<p class="note">{_text(of.about_answers)}</p>\n' if of.about_answers else ""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -133,7 +133,7 @@ class MatrixComparison:
             tones=TONES_OF_A_COMPARISON,
             result=first_page.result(findings),
             signatures=first_page.signatures(header),
-            appendix=first.appendix() if appendix else (),
+            appendix=(*_all_lines(named), *(first.appendix() if appendix else ())),
             logo=first_page.logo_of(header),
             paper=header.paper,
             made=made,
@@ -150,6 +150,13 @@ class MatrixComparison:
         }
 
 
+def _all_lines(named: Sequence[tuple[str, Comparison]]) -> Iterator[Section]:
+    """Both responses at each line, for each entry."""
+    for name, comparison in named:
+        section = comparison.response()
+        yield Section(f"{_arrow(name)}: {section.title}", section.parts)
+
+
 def _arrow(name: str) -> str:
     """An entry as in the report of a matrix run: "output ← input"."""
     return name.replace("/", " ← ")
@@ -158,5 +165,6 @@ def _arrow(name: str) -> str:
 def _section(name: str, comparison: Comparison) -> Section:
     """Picture, smallest detectable change and lines of an entry, under its name."""
     seen = detectable(comparison.differences.overall)
-    least = (pairs([(tr("smallest detectable change"), seen)]),) if seen else ()
-    return Section(_arrow(name), (comparison.picture(), *least, *comparison.response().parts))
+    least = (pairs([(tr("smallest detectable change of a line"), seen)]),) if seen else ()
+    differing = comparison.differing()
+    return Section(_arrow(name), (comparison.picture(), *least, *(differing.parts if differing else ())))

@@ -126,7 +126,7 @@ def _family(path: str) -> tuple[str, str] | None:
 
 
 STANDARDS = ("a-2a", "ua-1")
-_SHORT, _LETTERS_MAX = 24, 60  # letters of a column, when the widths of a table's columns are shared out
+_SHORT, _LETTERS_MAX = 30, 60  # letters of a column, when the widths of a table's columns are shared out
 
 
 def save_pdf(document: Document, path: Path, drawn: tuple[str, ...] | None = None) -> None:

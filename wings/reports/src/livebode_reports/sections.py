@@ -189,7 +189,9 @@ def quality(of: RunData) -> Section:
 def _counted(track: Track) -> str:
     """Number of fits, and why rows have none."""
     rows, without = sum(track.statuses.values()), {word: n for word, n in track.statuses.items() if word != OK}
-    return number(rows, ",") + (f" ({tr('rejected')}: {reasons(without)})" if without else "")
+    if not without:
+        return number(rows, ",")
+    return tr("{rows:,} (rejected: {reasons})", rows=rows, reasons=reasons(without))
 
 
 def source_state(of: RunData) -> Section | None:

@@ -47,15 +47,12 @@ class JobOrder:
     arguments
         Of the command `livebode`. They are passed to the process as they are, so each is made by the server: an option
         as one word ``--name=value``, and the names of runs and files from the listing of the server.
-    results
-        What the command writes, relative to the directory of the job.
     prepare
         Called before the command starts, to write what it reads.
     """
 
     task: str
     arguments: tuple[str, ...]
-    results: tuple[str, ...] = ()
     prepare: Callable[[], object] = lambda: None
 
 

@@ -13,6 +13,7 @@ from livebode.dashboard import Board, Order
 from livebode_start.job_pages import JobPages
 from livebode_start.jobs import Jobs
 from livebode_start.measure_pages import MeasurePages
+from livebode_start.task_pages import TaskPages
 from livebode_start.workspace import Workspace
 
 
@@ -34,7 +35,8 @@ class StartPages:
     def routes(self, board: Board, file: Callable[[str], Response], order: Order) -> list[BaseRoute]:
         """Routes of the pages."""
         measure = MeasurePages(self._workspace, self._jobs, board, file, order)
-        return [*JobPages(self._jobs, board, order).routes, *measure.routes]
+        tasks = TaskPages(self._workspace.directory, self._jobs, board, file, order)
+        return [*JobPages(self._jobs, board, order).routes, *measure.routes, *tasks.routes]
 
     async def run(self) -> None:
         """Wait until it is cancelled; then end the jobs."""

@@ -36,13 +36,13 @@ def harmless_name(text: str) -> str:
     text = unicodedata.normalize("NFC", text.encode(errors="ignore").decode())
     text = "".join(letter for letter in text if unicodedata.category(letter)[0] != "C")
     text = _FORBIDDEN.sub("_", text).strip(". ")
+    if _DEVICE.fullmatch(text):
+        text = f"_{text}"
     stem, dot, ending = text.rpartition(".")
     if not dot or len(ending) > _ENDING_LETTERS_MAX:
         stem, ending = text, ""
     stem = stem.encode()[:NAME_BYTES_MAX].decode(errors="ignore").strip(". ") or "recording"
     name = f"{stem}.{ending}" if ending else stem
-    if _DEVICE.fullmatch(name):
-        name = f"_{name}"
     return f"{name}.txt" if name.lower().endswith(_OWN) else name
 
 
@@ -72,7 +72,7 @@ class Workspace:
     def recordings(self) -> list[dict[str, Any]]:
         """Name, bytes and seconds since 1970 of each file with the ending of a recording, the newest first."""
         endings = tuple({ending for table in tables("readers") for format_ in table for ending in format_.suffixes})
-        rows = [
+        rows: list[dict[str, Any]] = [
             {"name": name, "size_bytes": status.st_size, "written": status.st_mtime}
             for name, status in self.files().items()
             if name.lower().endswith(endings)

@@ -5,6 +5,7 @@ import { reason } from "./link.js";
 import { element } from "./make.js";
 import { json } from "./runs_feed.js";
 import { size } from "./runs_words.js";
+import { taskBar } from "./task_bar.js";
 import { worded } from "./worded.js";
 
 /** @import { Workspace } from "./messages.js" */
@@ -47,6 +48,7 @@ export const workspace = (place) => {
     status,
   );
   place.append(card);
+  const tasks = taskBar(place);
 
   /** @param {File} file */
   async function send(file) {
@@ -91,7 +93,9 @@ export const workspace = (place) => {
     send(file);
   });
   let looked = false;
-  return ({ role, runs }) => {
+  return (all) => {
+    const { role, runs } = all;
+    tasks(all);
     card.hidden = role !== "operator";
     document.body.classList.toggle("no-runs", !card.hidden && !runs.size);
     if (card.hidden || looked) return;

@@ -148,6 +148,23 @@ export function stable(hz, { re, im }) {
 export const keepsClear = (places, known) =>
   places.every(({ re, im, radius }) => re.subarray(0, known).every((v, i) => length(1 + v, im[i]) > radius[i]));
 
+/**
+ * Where the bound comes nearest to −1, or past it: its place, its index and its share of |L|.
+ *
+ * @param {Disc[]} places
+ * @param {number} known
+ */
+export function widest(places, known) {
+  let [place, at, most] = [0, 0, -Infinity];
+  for (const [n, { re, im, radius }] of places.entries())
+    for (let i = 0; i < known; i++) {
+      const reach = radius[i] / length(1 + re[i], im[i]);
+      if (reach > most) [place, at, most] = [n, i, reach];
+    }
+  const { re, im, radius } = places[place];
+  return { place, at, share: radius[at] / length(re[at], im[at]) };
+}
+
 /** The largest |L| of every resonance that the lines permit above them, where no phase is known. @param {Disc[]} places @param {number} known */
 export const largestAbove = (places, known) =>
   Math.max(0, ...places.flatMap(({ rise, ...loop }) => fall(loop, known).map((size, i) => size * rise[i])));

@@ -169,13 +169,19 @@ export class WhatIfCard {
     page.dirty.add("bode").add("additions");
   }
 
+  /** A person has changed the trial: it is shown where it can be seen, which is not in the plant. */
+  moved() {
+    if (this.bode.quantity === "plant") this.watch("open loop");
+    this.changed();
+  }
+
   /** The table follows the sliders; called once a frame. */
   draw() {
     if (this.card.hidden || !this.facts) return;
     this.margins.draw(this.trial);
     this.steps.follow(this.page.axis, this.facts, this.trial, this.margins.after !== null);
     $("what-if-brief").textContent = this.facts.band ? briefWords(this.margins.after) : "";
-    $("what-if-plant").hidden = this.bode.quantity !== "plant";
+    $("what-if-plant").hidden = this.bode.quantity !== "plant" || isNothing(this.trial);
   }
 
   /** All rows, from the described loop and the trial. */
@@ -208,7 +214,7 @@ export class WhatIfCard {
     const onclick = () => {
       act();
       this.fill();
-      this.changed();
+      this.moved();
       const filters = this.rows.querySelectorAll("fieldset");
       (filters[filters.length - 1] ?? this.rows).querySelector("input")?.focus();
     };
@@ -231,7 +237,7 @@ export class WhatIfCard {
       onChange: (v) => {
         if (v === described) delete this.trial.values[name];
         else this.trial.values[name] = v;
-        this.changed();
+        this.moved();
       },
     });
   }
@@ -259,7 +265,7 @@ export class WhatIfCard {
         value: notch[part],
         onChange: (v) => {
           notch[part] = v;
-          this.changed();
+          this.moved();
         },
       });
     return element(
@@ -287,7 +293,7 @@ export class WhatIfCard {
       value: trial.lowPassHz,
       onChange: (v) => {
         trial.lowPassHz = v;
-        this.changed();
+        this.moved();
       },
     });
     const gone = this.removing(tr("remove the low-pass"), () => {
@@ -310,7 +316,7 @@ export class WhatIfCard {
       value: trial.delayMs,
       onChange: (v) => {
         trial.delayMs = v;
-        this.changed();
+        this.moved();
       },
     });
   }

@@ -53,11 +53,11 @@ function card() {
       "div",
       { class: "tried scroll", tabindex: 0, role: "group", "aria-labelledby": title },
       element("p", { class: "check open", id: "what-if-check" }, tr("Reading the response of the run …")),
+      element("div", rows),
+      element("textarea", text),
       plant,
       element("div", { id: "what-if-margins" }),
       element("div", { id: "what-if-steps" }),
-      element("div", rows),
-      element("textarea", text),
       element(
         "p",
         { class: "note" },

@@ -2,11 +2,20 @@
 // Bandwidth and margins of the described loop and of a trial: of the measured plant, and of the worst within its bounds.
 import { tr } from "./language.js";
 import { element } from "./make.js";
-import { keepsClear, largestAbove, largestFall, nearestHz, predicted, stable, withUnknown } from "./predicted.js";
+import {
+  keepsClear,
+  largestAbove,
+  largestFall,
+  nearestHz,
+  predicted,
+  stable,
+  widest,
+  withUnknown,
+} from "./predicted.js";
 import { feedback, nothing } from "./trial.js";
 import { orNoLimit } from "./whatif-text.js";
 import { worded } from "./worded.js";
-import { fixed, hertz } from "./words.js";
+import { fixed, hertz, plain } from "./words.js";
 
 /** @import { LoopBand, LoopFacts } from "./loop.js" */
 /** @import { Disc, Predicted } from "./predicted.js" */
@@ -118,27 +127,41 @@ export class TrialMargins {
     this.after = both(band, places);
     this.nearHz = nearestHz(band.frequency_hz, places, band.known);
     this.fill("after", this.after);
-    const text = [about(band), aboveWords(band, places)].filter(Boolean).join(" ");
+    const text = [wideWords(band, places, this.after), about(band), aboveWords(band, places)].filter(Boolean).join(" ");
     if (note.textContent !== text) note.textContent = text;
   }
 
   /** @param {"before" | "after"} side @param {Both} found */
   fill(side, found) {
     for (const kind of /** @type {const} */ (["measured", "worst"]))
-      for (const [name, , small, digits] of ROWS) {
+      for (const [row, [name, , small, digits]] of ROWS.entries()) {
         const cell = this.cells.get(`${side} ${kind} ${name}`);
         const value = found?.[kind]?.[name];
         if (!cell) continue;
         const mark = value === undefined || small(value);
         cell.className = mark ? "small" : "";
-        cell.textContent =
-          value === undefined
-            ? found
-              ? tr("unstable possible")
-              : tr("unstable")
-            : `${orNoLimit(value, digits)}${mark ? " ⚠" : ""}`;
+        // Said once: without stability there is no margin.
+        const none = row ? "–" : found ? tr("unstable possible") : tr("unstable");
+        cell.textContent = value === undefined ? none : `${orNoLimit(value, digits)}${mark ? " ⚠" : ""}`;
       }
   }
+}
+
+/** Why a plant within the bounds may be unstable. @param {LoopBand} band @param {Disc[]} places @param {Both} found */
+function wideWords({ frequency_hz: hz, known, lines_hz: lines }, places, found) {
+  if (!found || found.worst || keepsClear(places, known)) return "";
+  const { place, at, share } = widest(places, known),
+    near = Math.max(hz[at], lines[0]);
+  const words = { hz: hertz(Number(near.toPrecision(3))), percent: plain(100 * share, 2) };
+  if (places.length === 1)
+    return tr(
+      "Unstable possible: the response near {hz} Hz is known only within ± {percent} %. A longer measurement, or more excitation there, makes the bound narrower.",
+      words,
+    );
+  return tr(
+    "Unstable possible: at place {n} of {count} the response near {hz} Hz is known only within ± {percent} %. A longer measurement, or more excitation there, makes the bound narrower.",
+    { ...words, n: place + 1, count: places.length },
+  );
 }
 
 /** In one line. @param {Both} found */

@@ -1,0 +1,131 @@
+"""The way of a person from a recording to the Bode plot of a known machine, in Chromium."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from livebode.core import Responses
+from livebode.records import RunRecord
+from tests.support.browser import Tab, chromium
+from tests.support.command import livebode
+from tests.support.start_pages import CHANNELS, drop, start_page
+from tools.two_mass_servo import Servo, write_servo
+
+PHONE = {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobile": True}
+
+
+def newest(run: Path) -> Responses:
+    return RunRecord.open(run).responses()[-1:]
+
+
+def check_truth(run: Path) -> None:
+    """Value and bounds at each line are those of the machine."""
+    response = newest(run)
+    truth = Servo().response(response.frequency_hz)
+    error = np.abs(response.value[0] - truth)
+    assert np.all(error < 0.05 * np.abs(truth))
+    assert np.mean(error < 3 * response.sigma[0]) > 0.9
+
+
+def test_from_a_csv_to_a_bode_plot_with_bounds_without_toml(tmp_path: Path) -> None:
+    log, folder = write_servo(tmp_path / "servo.csv"), tmp_path / "runs"
+    with start_page(folder) as url, chromium() as browser, Tab(browser, url, wait=False) as tab:
+        tab.page.wait_for_selector(".no-runs .drop")
+        assert not tab.page.is_visible(".list")
+        drop(tab, log)
+        chosen = {role: tab.page.input_value(f"#role-{role}") for role in (*CHANNELS, "schedule")}
+        assert chosen == CHANNELS | {"schedule": ""}
+        assert all(tab.page.inner_text(f"#role-{role}-reason") for role in CHANNELS)
+        tab.page.click("#measure")
+        tab.page.wait_for_url("**/run/servo/")
+        tab.until("window.livebode?.bode.curves.measured")
+        shown_db = tab.numbers("bode.curves.measured.frame.magnitude")
+        assert tab.wrong == []
+    np.testing.assert_allclose(shown_db, 20 * np.log10(np.abs(newest(folder / "servo").value[0])), atol=0.01)
+    check_truth(folder / "servo")
+
+
+def test_the_configuration_is_what_inspect_writes_and_the_terminal_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = tmp_path / "runs"
+    with start_page(folder) as url, chromium() as browser, Tab(browser, url, wait=False) as tab:
+        drop(tab, write_servo(tmp_path / "servo.csv"))
+        tab.page.click("#toml summary")
+        text, command = tab.page.inner_text("#text"), tab.page.inner_text("#command")
+        tab.page.click("#measure")
+        tab.page.wait_for_url("**/run/servo/")
+    monkeypatch.chdir(folder)
+    assert livebode("inspect", "servo.csv", "--out", "inspected.toml", "--yes").code == 0
+    assert (folder / "inspected.toml").read_text().strip() == text.strip()
+    assert (folder / "servo.toml").read_text().strip() == text.strip()
+    words = command.split()
+    assert words[:2] == ["livebode", "run"]
+    in_terminal = livebode(*words[1:-1], "--out", "terminal")
+    assert in_terminal.code == 0
+    np.testing.assert_array_equal(newest(folder / "terminal").value, newest(folder / "servo").value)
+
+
+def test_roles_change_by_drag_and_by_select_and_lines_follow(tmp_path: Path) -> None:
+    with start_page(tmp_path / "runs") as url, chromium() as browser, Tab(browser, url, wait=False) as tab:
+        drop(tab, write_servo(tmp_path / "servo.csv"))
+        tab.page.drag_and_drop(".signal[data-name='motor_speed'] b", ".slot[data-role='input']")
+        assert tab.page.input_value("#role-input") == "motor_speed"
+        assert tab.page.input_value("#role-output") == "torque"  # they change places
+        tab.page.select_option("#role-input", "torque")
+        assert tab.page.input_value("#role-output") == "motor_speed"
+        tab.page.wait_for_selector("#measure:enabled")
+        tab.page.select_option("#role-output", "")
+        tab.page.wait_for_selector("#ready.wrong")
+        assert tab.page.is_disabled("#measure")
+        assert "output" in tab.page.inner_text("#ready")
+        assert [word for word in tab.wrong if "400" not in word] == []
+
+
+def test_span_lines_and_window_are_used_as_edited(tmp_path: Path) -> None:
+    folder = tmp_path / "runs"
+    with start_page(folder) as url, chromium() as browser, Tab(browser, url, wait=False) as tab:
+        drop(tab, write_servo(tmp_path / "servo.csv"))
+        tab.page.fill("#from", "1")
+        tab.page.fill("#to", "7")
+        tab.page.fill("#frequencies", "4:16:4")
+        tab.page.wait_for_selector("#measure:enabled")
+        tab.page.wait_for_function("() => document.getElementById('text').textContent.includes('from = 1')")
+        tab.page.click("#measure")
+        tab.page.wait_for_url("**/run/servo/")
+    summary = json.loads((folder / "servo" / "run.json").read_text())
+    configuration = summary["configuration"]
+    assert (configuration["source"]["from"], configuration["source"]["to"]) == (1.0, 7.0)
+    np.testing.assert_allclose(newest(folder / "servo").frequency_hz, np.arange(4, 17, 4))
+    assert newest(folder / "servo").time_s[0] < 7
+
+
+def test_a_german_csv_is_measured_on_a_phone(tmp_path: Path) -> None:
+    folder = tmp_path / "runs"
+    with start_page(folder) as url, chromium() as browser, Tab(browser, url, wait=False, **PHONE) as tab:
+        drop(tab, write_servo(tmp_path / "Prüfstand 3.csv", german=True))
+        assert tab.page.evaluate("() => document.documentElement.scrollWidth <= innerWidth")
+        assert tab.page.inner_text(".signal:last-child b") == "Geschwindigkeit für Regler"
+        tab.page.tap("#measure")
+        tab.page.wait_for_url("**/run/**")
+        assert tab.wrong == []
+    check_truth(folder / "Prüfstand 3")
+
+
+def test_a_measurement_is_cancelled_and_nothing_is_half_written(tmp_path: Path) -> None:
+    folder = tmp_path / "runs"
+    with start_page(folder) as url, chromium() as browser, Tab(browser, url, wait=False) as tab:
+        drop(tab, write_servo(tmp_path / "servo.csv"))
+        tab.page.click("#measure")
+        tab.page.click(".job button")
+        tab.page.wait_for_selector("#measure:enabled")
+        assert "cancelled" in tab.page.inner_text("#ready")
+        tab.page.click("#measure")
+        tab.page.wait_for_url("**/run/**")
+    runs = [path for path in folder.iterdir() if path.is_dir()]
+    assert [path.name for path in runs] == ["servo-2"]
+    check_truth(runs[0])
