@@ -53,7 +53,7 @@ _ARGUMENTS = {
 
 
 @overload
-def frf(  # type: ignore[overload-overlap]  # a list of arrays is an array too, and means several outputs
+def frf(  # a list of arrays, which is an array too, means several outputs
     u: ArrayLike, y: Sequence[NDArray[Any]], /, *, fs: float | None = ..., lines: FRFLines = ...,
     window: int | Literal["auto"] = ..., estimator: FRFEstimator = ..., accept_roles: bool = ...,
 ) -> list[Response]: ...  # fmt: skip
@@ -63,7 +63,7 @@ def frf(
     window: int | Literal["auto"] = ..., estimator: FRFEstimator = ..., accept_roles: bool = ...,
 ) -> Response: ...  # fmt: skip
 @overload
-def frf(  # type: ignore[overload-overlap]
+def frf(
     w: ArrayLike, u: ArrayLike, y: Sequence[NDArray[Any]], /, *, fs: float | None = ..., lines: FRFLines = ...,
     window: int | Literal["auto"] = ..., estimator: FRFEstimator = ..., accept_roles: bool = ...,
 ) -> list[Response]: ...  # fmt: skip

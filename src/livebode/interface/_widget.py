@@ -36,7 +36,7 @@ export default { render };
 """
 
 
-class RunWidget(anywidget.AnyWidget):  # type: ignore[misc]  # it has no types
+class RunWidget(anywidget.AnyWidget):
     """The newest response of a run with its bound, in front of those before it; drawn again as the record grows.
 
     The notebook asks for it, so that nothing is read while nobody looks, and a cell that runs delays it.
