@@ -8,7 +8,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from livebode.configuration.toml_mistakes import meant_line, meant_path, mistake_at
+from livebode.configuration.toml_mistakes import meant_lines, meant_path, mistake_at
 from livebode.core import ConfigError, LivebodeError
 
 FILE_BYTES_MAX = 1 << 20
@@ -72,6 +72,27 @@ def _decoded(data: bytes) -> str:
     """The text; an editor of Windows writes a byte order mark first, or UTF-16."""
     is_utf16 = data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
     return data.decode("utf-16" if is_utf16 else "utf-8-sig").replace("\r\n", "\n")
+
+
+def meant_line(line: str) -> str | None:
+    r"""The line of TOML that was probably meant, which is one; None if nothing usual is wrong.
+
+    >>> meant_line('log = "C:\\data\\log.csv"'), meant_line("output = velocity"), meant_line('output: "y"')
+    ("log = 'C:\\data\\log.csv'", 'output = "velocity"', 'output = "y"')
+    >>> meant_line("rate_hz = 0,5  # kHz"), meant_line("average = True"), meant_line("frequencies: 20:140:20")
+    ('rate_hz = 0.5  # kHz', 'average = true', 'frequencies = "20:140:20"')
+    >>> meant_line("output = “y”"), meant_line("// my axis"), meant_line('output = "y'), meant_line("[source")
+    ('output = "y"', '# my axis', 'output = "y"', '[source]')
+    """
+    return next((meant for meant in meant_lines(line) if meant != line and _is_toml(meant)), None)
+
+
+def _is_toml(line: str) -> bool:
+    try:
+        tomllib.loads(line)
+    except ValueError:
+        return False
+    return True
 
 
 def _not_utf8(data: bytes, at: int, origin: str) -> ConfigError:
