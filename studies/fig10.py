@@ -54,7 +54,7 @@ def offline(position_m: float = POSITION_M, seed: int = 0) -> Response:
     ticks = int(SECONDS * RATE_HZ)
     sweep = 2.0 * chirp(np.arange(ticks) / RATE_HZ, 5.0, SECONDS, 250.0)
     block = at_standstill(sweep, SECONDS, seed, motion=Standstill(position_m=position_m))
-    return welch(block, input="u", output="velocity", excitation="w", window=int(RATE_HZ), overlap=0.75)
+    return welch(block["w"], block["u"], block["velocity"], fs=RATE_HZ, window=int(RATE_HZ), overlap=0.75)
 
 
 def online(runs: int, mechanics: Mechanics | None = None) -> list[Response]:

@@ -2,24 +2,31 @@
 
 livebode tracks the frequency response of a servo axis in closed loop, sample by sample, with tested error bounds.
 
-Quick start, without a machine::
+Three arrays of a machine in a control loop (its excitation w, input u and output y) to a Bode plot with bounds::
+
+    response = livebode.frf(w, u, y, fs=4000)
+    response.plot()
+
+The same without a machine::
 
     >>> import livebode
-    >>> responses = livebode.example_responses()        # a simulated belt axis, tracked for a second
-    >>> response = responses[-1]                        # the newest
+    >>> block, _ = livebode.example_axis().run()        # a simulated belt axis, for a second
+    >>> response = livebode.frf(block["w"], block["u"], block["velocity"], fs=4000)
     >>> response.magnitude_db.round(1)[:3]
-    array([  2.6,  -2.9, -13.3])
+    array([  2.6,  -2.8, -13.4])
     >>> response(60.0).round(2)                         # the value at a measured line
-    np.complex128(4.27-1.64j)
+    np.complex128(4.2-1.63j)
     >>> axes = response.plot()                          # Bode; also "nyquist", "nichols"
     >>> frame = response.to_pandas()                    # or to_xarray(), to_frd()
 
-A run that `livebode run` recorded::
+`track` gives a response for each moment. A recording, or a run that `livebode run` recorded::
 
-    run = livebode.Run("runs/monday")
+    log = livebode.open("log.csv")
+    response = livebode.frf(log["w"], log["u"], log["velocity"], fs=log.rate_hz)
+    run = livebode.open("runs/monday")
     run.plot(), run.fit(), run.margins(), run.events
 
-With a machine, in this order:
+With a machine, step by step:
 
 1. Excitation: `design` an experiment within the limits of the machine, or make a period yourself with `multisine`,
    `prbs`, `chirp` or `stepped_sine`.
@@ -30,8 +37,9 @@ With a machine, in this order:
 
 Names by subject:
 
+- Arrays and files to responses: frf, track, welch, open
 - Samples and lines: Block, Channel, Lines, Log, open_log
-- Responses: Response, Responses, Settings, Tracker, NonPeriodicTracker, MotionCorrection, SlidingDFT, welch
+- Responses: Response, Responses, Settings, Tracker, NonPeriodicTracker, MotionCorrection, SlidingDFT
 - Runs: Run
 - Excitation: design, Excitation, chirp, low_crest_phases, multisine, odd_lines, prbs, quantised, recognise,
   stepped_sine
@@ -42,7 +50,8 @@ Names by subject:
 - Examples: example_axis, example_responses, example_run
 - Errors: LivebodeError (a ValueError) and its kinds ArchiveError, BaselineError, ConfigError, DesignError, ExtraError,
   FitError, FleetError, GridError, LocationError, MeasurementError, OutputError, PublishError, RecordError,
-  RecordingError, ServerError, SignalError, SimulationError, SourceError, StateError, TuneError, UsageError
+  RecordingError, ServerError, SignalError, SimulationError, SourceError, StateError, TuneError, UsageError; a finding
+  on signals is a SignalWarning
 
 Units are last in a name (`rate_hz`, `time_s`). A bound of `c` sigma covers the true value with probability
 1 − exp(−c²). Every public name loads its part of livebode when it is first used. These names are the public interface,

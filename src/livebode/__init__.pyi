@@ -28,6 +28,7 @@ from livebode.core import Response as Response
 from livebode.core import Responses as Responses
 from livebode.core import ServerError as ServerError
 from livebode.core import SignalError as SignalError
+from livebode.core import SignalWarning as SignalWarning
 from livebode.core import SimulationError as SimulationError
 from livebode.core import SourceError as SourceError
 from livebode.core import StateError as StateError
@@ -58,6 +59,9 @@ from livebode.interface import design as design
 from livebode.interface import example_axis as example_axis
 from livebode.interface import example_responses as example_responses
 from livebode.interface import example_run as example_run
+from livebode.interface import frf as frf
+from livebode.interface import open as open
+from livebode.interface import track as track
 from livebode.kernel import SlidingDFT as SlidingDFT
 from livebode.monitoring import Baseline as Baseline
 from livebode.monitoring import Monitor as Monitor

@@ -36,7 +36,7 @@ def test_the_reference_of_the_torque_is_the_input_and_a_velocity_goes_before_a_p
     assert [line.split(" (")[0] for line in written.out.splitlines()[:3]] == [
         "excitation: M_stoer", "input: M_soll", "output: n_ist",
     ]  # fmt: skip
-    line = written.out.splitlines()[-1].removeprefix("Track it: ")
+    line = written.out.splitlines()[-1].removeprefix("Next: ")
     assert shlex.split(line) == ["livebode", "run", str(out)]  # the shell finds one file
 
 

@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 
 from livebode.sources.live import encode_line
-from tests.runtime.test_live_run_truth import axis, sent
 from tests.support.command import livebode, signals, write_parquet
 from tests.support.forked import Command
+from tests.support.live_runs import axis, sent
 from tests.support.peers.peer import PATIENCE_S
 from tests.support.small_axis import SMALL_AXIS
 
@@ -49,7 +49,7 @@ def test_an_edited_configuration_of_a_recording_is_a_new_run(tmp_path: Path) -> 
 def test_a_machine_continues_its_run_and_begins_another_with_another_configuration(tmp_path: Path) -> None:
     """Also when that is given again, the run of the newest configuration continues."""
 
-    def tracked(text: str, *, end: bool) -> int:
+    def tracked(text: str, *, end: bool) -> int | None:
         path = axis(tmp_path, 'url = "stdin:"', text)
         with Command("run", path, "--json") as process:
             assert process.stdin is not None

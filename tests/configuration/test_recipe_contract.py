@@ -22,7 +22,7 @@ NEEDED: dict[str, Any] = {
     "loop.position_pd": {"position_gain": 1.0, "velocity_gain": 1.0, "rate_hz": 4000},
 }
 APART = {"serve", "record", "report", "machine", "publish"}
-READING = {"time", "clock", "from", "to", "skip_periods", "rate_hz", "kinds"}
+READING = {"time", "clock", "from", "to", "skip_periods", "rate_hz", "kinds", "units"}
 FILES = {("monitoring", "baseline"), ("source", "dbc")}
 WHOLE = """
 [source]

@@ -75,8 +75,8 @@ def test_every_model_finds_itself_from_no_start(case: str) -> None:
     assert found.status == "ok", found.sentence
     assert np.allclose(found.parameters.value[0], values, rtol=1e-3, atol=1e-7)
     assert np.allclose(found.response(FINE.frequency_hz), exact.value[0], rtol=1e-4)
-    s = found.to_control()
-    z = found.to_control(discrete=True)
+    s = found.to_tf()
+    z = found.to_tf(discrete=True)
     f = FINE.frequency_hz[4]
     # A friction that is fitted as nearly zero is a pole near z = 1, where coefficients lose digits (`to_discrete`).
     assert complex(z(np.exp(2j * np.pi * f / 4000))) == pytest.approx(complex(found.response(f)), rel=5e-6)

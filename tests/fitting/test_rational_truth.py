@@ -37,7 +37,7 @@ def test_without_noise_the_system_is_found(method: str) -> None:
     assert np.allclose(found.value, COEFFICIENTS, rtol=1e-4)
     model = rational_of(found, 1, RATE_HZ)
     assert np.allclose(model.response(LINES.frequency_hz), held(), rtol=1e-6)
-    assert complex(model.to_control()(LINES.z[3])) == pytest.approx(held()[3], rel=1e-6)
+    assert complex(model.to_tf()(LINES.z[3])) == pytest.approx(held()[3], rel=1e-6)
     poles = model.continuous().poles()
     assert np.abs(poles[-1]) / (2 * np.pi) == pytest.approx(BELT.derived(TRUTH)[0], rel=1e-3)
 

@@ -178,7 +178,9 @@ def _callables() -> Iterator[tuple[str, Callable[..., object]]]:
         pytest.param(callable_, id=name)
         for name, callable_ in _callables()
         # Facts of an error have any name; the options of a fit are those of its model, as the next test shows.
-        if not (name.split(".")[0].endswith("Error") or name in ("fit", "Fitter", "Model", "PhysicalModel"))
+        if not (
+            name.split(".")[0].endswith(("Error", "Warning")) or name in ("fit", "Fitter", "Model", "PhysicalModel")
+        )
     ],
 )
 def test_every_misspelt_keyword_raises(callable_: Callable[..., object]) -> None:

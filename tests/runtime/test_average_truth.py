@@ -12,7 +12,7 @@ from scipy.linalg import expm
 from scipy.stats import binom
 
 import livebode
-from livebode.core import Block, Lines, Responses
+from livebode.core import Block, Channel, Lines, Responses
 from livebode.estimation import Settings, Tracker
 from livebode.fitting import DriftTest
 from livebode.fitting.drift import FALSE_ALARM
@@ -46,13 +46,15 @@ def response(stiffness: float) -> np.ndarray:
 def excitation() -> np.ndarray:
     phases = -np.pi * np.arange(len(LINES)) ** 2 / len(LINES)
     n = np.arange(WINDOW)
-    return 0.02 * sum(np.cos(2 * np.pi * k * n / WINDOW + p) for k, p in zip(LINES.bins, phases))
+    lines = np.array([np.cos(2 * np.pi * k * n / WINDOW + p) for k, p in zip(LINES.bins, phases)])
+    return np.asarray(0.02 * lines.sum(axis=0))
 
 
 def recorded(seed: int, periods: int, *, softer: float = 0.0, noise: float = 0.02) -> np.ndarray:
     """Excitation, torque and speed of the axis in closed loop, (3, samples); it loses stiffness evenly by `softer`."""
     rng = np.random.default_rng(seed)
-    run_in, state, integral, rows = 3, np.zeros(3), 0.0, []
+    run_in, state, integral = 3, np.zeros(3), 0.0
+    rows: list[tuple[float, float, float]] = []
     stretches = 1 if not softer else periods
     w = np.tile(excitation(), periods + run_in)
     noises = noise * rng.standard_normal(w.size)
@@ -69,11 +71,13 @@ def recorded(seed: int, periods: int, *, softer: float = 0.0, noise: float = 0.0
     return np.array(rows)[WINDOW * run_in :].T
 
 
-def averaged(samples: np.ndarray, **options: object) -> livebode.Responses:
-    settings = Settings(
-        lines=LINES, output="y", input="u", excitation="w", average=True, forgetting=1.0, hop=250, **options
-    )  # type: ignore[arg-type]
-    return Tracker(settings).process(Block(samples, ("w", "u", "y"), RATE_HZ))
+def block(samples: np.ndarray) -> Block:
+    return Block(samples, tuple(map(Channel, "wuy")), RATE_HZ)
+
+
+def averaged(samples: np.ndarray) -> Responses:
+    settings = Settings(lines=LINES, output="y", input="u", excitation="w", average=True, forgetting=1.0, hop=250)
+    return Tracker(settings).process(block(samples))
 
 
 @cache
@@ -123,13 +127,12 @@ def test_the_bounds_of_an_average_cover() -> None:
         average = healthy(seed)[-1]
         inside += int(np.count_nonzero(np.abs(average.value - truth) <= _radius(average)))
         count += len(LINES)
-    low, high = binom.ppf([0.0005, 0.9995], count, 0.95)
-    assert low <= inside <= high
+    assert binom.ppf(0.0005, count, 0.95) <= inside <= binom.ppf(0.9995, count, 0.95)
 
 
 def _radius(average: livebode.Response) -> np.ndarray:
     """Of the circle that contains the true value with 95 %: |e|²/σ² is F(2, 2·dof)."""
-    return average.sigma * np.sqrt(average.dof * (0.05 ** (-1 / average.dof) - 1))
+    return np.asarray(average.sigma * np.sqrt(average.dof * (0.05 ** (-1 / average.dof) - 1)))
 
 
 def test_windows_of_an_average_are_those_without_it() -> None:
@@ -137,7 +140,7 @@ def test_windows_of_an_average_are_those_without_it() -> None:
     samples = recorded(3, 20, softer=0.03, noise=0.002)
     single = Tracker(Settings(lines=LINES, output="y", input="u", excitation="w", hop=250))
     own, expected = DriftTest(LINES), DriftTest(LINES)
-    expected.add(single.process(Block(samples, ("w", "u", "y"), RATE_HZ)))
+    expected.add(single.process(block(samples)))
     own.add(averaged(samples))
     # With a resonance that moves, the input changes, whose power is taken as constant.
     away = np.abs(own.result().change - expected.result().change)

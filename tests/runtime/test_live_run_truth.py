@@ -15,33 +15,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from livebode.core import Channel, Event
+from livebode.core import Event
 from livebode.dashboard.run_entry import entry
 from livebode.records import RunRecord
 from livebode.runtime import Document, RunStarted
-from livebode.sources.live import Batch, encode_layout, encode_line, encode_samples
+from livebode.sources.live import encode_layout, encode_line, encode_samples
 from tests.support.command import RATE_HZ, livebode, signals, write_parquet
-from tests.support.live_runs import started, table
+from tests.support.live_runs import CHANNELS, axis, sent, started, table
 from tests.support.live_session import LiveSession
 from tests.support.peers.peer import PATIENCE_S, batches, free_port, until
 from tests.support.peers.plain import TcpPeer, wait_read
 from tests.support.small_axis import SMALL_AXIS
-
-CHANNELS = (Channel("w", "A"), Channel("u", "A"), Channel("y", "rad/s"))
-
-
-def sent(samples: int = 2000, size: int = 40, first: int = 70_000) -> list[Batch]:
-    columns = signals(samples)
-    data = np.array([columns[name] for name in "wuy"])
-    return [
-        Batch(first + at, data[:, at : at + size].copy(), CHANNELS, float(RATE_HZ), 9) for at in range(0, samples, size)
-    ]
-
-
-def axis(folder: Path, source: str, rest: str = SMALL_AXIS) -> Path:
-    path = folder / "axis.toml"
-    path.write_text(f"[source]\n{source}\n{rest}")
-    return path
 
 
 def test_lines_on_standard_input_give_what_the_recording_gives(tmp_path):

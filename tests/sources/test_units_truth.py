@@ -175,6 +175,20 @@ def test_the_same_machine_in_the_units_of_any_drive_has_the_same_parameters(
     assert values(found) == pytest.approx(in_si, rel=1e-6)
 
 
+def test_a_linear_motor_has_masses_in_kilograms(tmp_path: Path, in_si: dict[str, float]) -> None:
+    """The same numbers with a force in N and a speed in mm/s."""
+    export = Export(T, ("w [N]", 1), ("Kraft [N]", 1), ("v [mm/s]", 1e3))
+    found = fitted(tmp_path / "run", export.write(tmp_path / "log.csv"), export.names, {})
+    rows = {name: (value, unit) for name, value, _, unit in found.rows()}
+    assert rows["Js"] == (pytest.approx(in_si["Js"], rel=1e-6), "kg")
+    assert rows["mL"] == (pytest.approx(in_si["JL"], rel=1e-6), "kg")
+    assert rows["Keff"] == (pytest.approx(in_si["Keff"], rel=1e-6), "N/m")
+    turned = Export(T, ("w [N]", 1), ("Kraft [N]", 1), ("n [rpm]", RPM))
+    gain = fitted(tmp_path / "gain", turned.write(tmp_path / "turned.csv"), turned.names, {})
+    assert gain.rows()[0][3] == "rad/s²/N"
+    assert any("'Kraft' is in N; a force drives masses only if the output is in m or m/s" in one for one in REMARKS)
+
+
 def test_counts_of_an_encoder_give_the_machine_within_their_steps(tmp_path: Path) -> None:
     export = Export(
         T, ("exc_Nm", 1), ("torque_Nm", 1), ("position_counts", COUNTS), {"position_counts": "1/1048576 rev"}, True

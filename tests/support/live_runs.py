@@ -7,8 +7,28 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 
+from livebode.core import Channel
 from livebode.records import RunRecord
+from livebode.sources.live import Batch
+from tests.support.command import RATE_HZ, signals
 from tests.support.forked import Command
+from tests.support.small_axis import SMALL_AXIS
+
+CHANNELS = (Channel("w", "A"), Channel("u", "A"), Channel("y", "rad/s"))
+
+
+def sent(samples: int = 2000, size: int = 40, first: int = 70_000) -> list[Batch]:
+    columns = signals(samples)
+    data = np.array([columns[name] for name in "wuy"])
+    return [
+        Batch(first + at, data[:, at : at + size].copy(), CHANNELS, float(RATE_HZ), 9) for at in range(0, samples, size)
+    ]
+
+
+def axis(folder: Path, source: str, rest: str = SMALL_AXIS) -> Path:
+    path = folder / "axis.toml"
+    path.write_text(f"[source]\n{source}\n{rest}")
+    return path
 
 
 def started(path: Path, out: Path, pictures: bool = False) -> Command:

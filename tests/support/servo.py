@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from scipy.signal import cont2discrete, lfilter
 
-from livebode.arrays import Floats
+from livebode.arrays import Complex, Floats
 
 AXIS = """
 [source]
@@ -44,13 +44,24 @@ class Servo:
     def antiresonance_hz(self) -> float:
         return float(np.sqrt(self.stiffness / self.load) / (2 * np.pi))
 
+    def _discrete(self, rate_hz: float) -> tuple[Floats, Floats]:
+        """Numerator and denominator from torque to speed, with the hold."""
+        spring = 2 * self.damping * 2 * np.pi * self.resonance_hz / (1 / self.motor + 1 / self.load)
+        whole = self.motor + self.load
+        numerator = np.array([self.load, spring, self.stiffness])
+        denominator = np.array([self.motor * self.load, whole * spring, whole * self.stiffness, 0.0])
+        (b,), a, _ = cont2discrete((numerator, denominator), 1 / rate_hz)
+        return b, a
+
+    def response(self, frequency_hz: Floats, rate_hz: float = 2000.0) -> Complex:
+        """Torque to speed, as it is sampled."""
+        b, a = self._discrete(rate_hz)
+        z = np.exp(2j * np.pi * frequency_hz / rate_hz)
+        return np.asarray(np.polyval(b, z) / np.polyval(a, z))
+
     def recording(self, seed: int, periods: int, noise: float = 0.03, rate_hz: float = 2000.0) -> dict[str, Floats]:
         """Time, excitation, torque and speed from rest, with white noise on the speed, whose loop has a gain."""
-        spring = 2 * self.damping * 2 * np.pi * self.resonance_hz / (1 / self.motor + 1 / self.load)
-        numerator = [self.load, spring, self.stiffness]
-        whole = self.motor + self.load
-        denominator = [self.motor * self.load, whole * spring, whole * self.stiffness, 0.0]
-        (b,), a, _ = cont2discrete((numerator, denominator), 1 / rate_hz)
+        b, a = self._discrete(rate_hz)
         lines, n = np.arange(4, 200, 4), 1000
         phases = -np.pi * np.arange(lines.size) ** 2 / lines.size
         period = np.cos(2 * np.pi * np.outer(np.arange(n) / rate_hz, lines) + phases).sum(axis=1)

@@ -22,6 +22,7 @@ from typer.core import TyperCommand, TyperGroup
 from livebode.cli.commands import ABOUT, OPTIONS, Command
 from livebode.cli.failures import disk_full, failure_of, json_requested, name_options, unparsed
 from livebode.cli.log_options import File, Level, LogOptions, logged
+from livebode.cli.next_step import Result, next_line
 from livebode.cli.remote import with_copies
 from livebode.cli.terminal import print_page, protect
 from livebode.core import DamageWarning, LivebodeError, needing
@@ -96,10 +97,12 @@ class _Command(_Light, TyperCommand):
         module = self.callback.__module__ if self.callback else __name__
         try:
             with arrow, logged(ctx.info_name, module, ctx.obj):
-                return super().invoke(ctx)
+                result = super().invoke(ctx)
         except LivebodeError as error:
             name_options(error, self.params)
             raise
+        if isinstance(result, Result) and not json_requested() and (line := next_line(result)) is not None:
+            print(line)
 
 
 class _Commands(Mapping[str, TyperCommand]):
@@ -200,6 +203,8 @@ def run_application() -> None:
     except Exception as error:
         _fail(error)
     else:
+        if code == 130:  # Ctrl-C in a command: Typer has made an exit of it
+            _stop("livebode: stopped; no file is half written", code)
         sys.exit(code)
 
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from livebode.cli import terminal
 from livebode.cli.live_survey import is_live
+from livebode.cli.next_step import Result
 from livebode.cli.shell import command_line
 from livebode.core import LivebodeError, OutputError, RecordingError, SourceError, UsageError, write_whole, writing
 from livebode.locations import Location, Url, local_copy, location
@@ -48,7 +49,7 @@ def write_configuration(
     yes: bool,
     force: bool,
     as_json: bool,
-) -> None:
+) -> Result:
     """Write the configuration of a recording: list its channels, propose their roles, ask, and find lines and window.
 
     What is given is not asked for; "-" is no channel. An answer that the recording contradicts is asked for again.
@@ -89,11 +90,12 @@ def write_configuration(
         write_whole(out, result.text(title).encode())
     if as_json:
         print(to_json({"file": str(out), "configuration": result.tables}))
-        return
+        return Result("configuration", str(out))
     if console is None:
         reasons = ((role, name, result.comments["signals", role]) for role, name in result.tables["signals"].items())
         print("".join(f"{role}: {name} ({reason})\n" for role, name, reason in reasons), end="")
-    print(f"{out}\nTrack it: {command_line('livebode', 'run', str(out))}")
+    print(out)
+    return Result("configuration", str(out))
 
 
 def _heard(url: str, rate: float | None) -> tuple[Recorded, dict[str, Any]]:
@@ -194,7 +196,7 @@ class Dialog:
             )
             self._answers[role] = name = answer if answer in names else numbers.get(answer, answer)
             self._reasons[role] = guess.reason if name == guess.channel else "as specified"
-        signals = {role: name for role in _QUESTIONS if (name := _channel(self._answers[role]))}
+        signals = {role: channel for role in _QUESTIONS if (channel := _channel(self._answers[role]))}
         _check_signals(signals, names, str(self._proposals.log.path))
         return signals, {role: self._reasons[role] for role in signals}
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from livebode.cli import terminal
+from livebode.cli.next_step import Result
 from livebode.cli.options import Json, Port, Serve
 
 if TYPE_CHECKING:
@@ -32,7 +33,7 @@ def demo_command(
     serve: Serve = False,
     port: Port = None,
     as_json: Json = False,
-) -> None:
+) -> Result:
     """Track a simulated belt axis during its strokes, live; halfway, the belt loses 10 % of its stiffness."""
     from rich.progress import BarColumn, Progress, TextColumn
 
@@ -80,9 +81,10 @@ def demo_command(
             outcome = demo(to, seconds=seconds, seed=_SEED, real_time=not fast, baseline=baseline)
         if as_json:
             print(to_json({"directory": str(outcome.directory)} | outcome.summary), flush=True)
-            return
-        show(outcome)
-        sys.stdout.flush()
+        else:
+            show(outcome)
+            sys.stdout.flush()
+    return Result("run", str(out))
 
 
 def _numbers(responses: Responses) -> str:

@@ -10,6 +10,7 @@ import typer
 from livebode.cli import terminal
 from livebode.cli.configuration_dialog import write_configuration
 from livebode.cli.live_survey import is_live, show_survey
+from livebode.cli.next_step import Result
 from livebode.cli.options import Excitation, Json, Output, check_use
 from livebode.cli.recording_options import Dbc, From, Rate, SkipPeriods, Time, To
 from livebode.core import UsageError, counted
@@ -78,7 +79,7 @@ def inspect_command(
     skip_periods: SkipPeriods = None,
     dbc: Dbc = None,
     as_json: Json = False,
-) -> None:
+) -> Result | None:
     """List channels, rate, gaps and samples that are not finite; with --out propose and write axis.toml.
 
     With --excitation, also print period, lines and SNR. With --lines, search for mains hum in a recording without
@@ -90,14 +91,13 @@ def inspect_command(
     check_use(context, "--out axis.toml", _OF_CONFIGURATION, _OF_BOTH)
     if out is not None:
         given = {"excitation": excitation, "input": input_, "output": output, "schedule": schedule}
-        write_configuration(
+        return write_configuration(
             log, out, given, estimator=estimator, average=average, fit=fit, rate=rate, time=time, dbc=dbc,
             yes=yes, force=force, as_json=as_json,
         )  # fmt: skip
-        return
     if is_live(log):
         show_survey(log, as_json=as_json)
-        return
+        return Result("recording", log)
     _check(excitation, output, input_, lines, window)
     from livebode.preparation import inspect  # with its statistics half a second to import
     from livebode.records import to_json
@@ -118,7 +118,7 @@ def inspect_command(
     )
     if as_json:
         print(to_json(found.plain()))
-        return
+        return None
     console = terminal.console(markup=False)  # names and units may contain brackets
     _show_recording(found, console)
     if found.quiet is not None:
@@ -129,6 +129,7 @@ def inspect_command(
         console.print(f"The excitation is not recognised: {found.unrecognised}", soft_wrap=True)
     if found.estimator:
         console.print(f"estimator of a run: --estimator {found.estimator} ({_SUITS[found.estimator]})", soft_wrap=True)
+    return Result("recording", log)
 
 
 def _check(

@@ -7,25 +7,26 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from functools import wraps
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from livebode.core import LocationError
 from livebode.locations import Location, Url
 
+T = TypeVar("T")
 _COLLAPSED = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+:[/\\]")
 """How a URL begins that was taken for a path, which has no empty part."""
 
 
-def with_copies(command: Callable[..., None]) -> Callable[..., None]:
+def with_copies(command: Callable[..., T]) -> Callable[..., T]:
     """The command, of which an argument that is a `Url` becomes the path of a copy for as long as it runs.
 
     LocationError if a URL was given where only a path is possible.
     """
 
     @wraps(command)
-    def with_paths(**given: Any) -> None:
+    def with_paths(**given: Any) -> T:
         with ExitStack() as copies:
-            command(**{name: _here(value, name, copies) for name, value in given.items()})
+            return command(**{name: _here(value, name, copies) for name, value in given.items()})
 
     return with_paths
 

@@ -6,6 +6,7 @@ from typing import Annotated, Any
 
 import typer
 
+from livebode.cli.next_step import Result
 from livebode.cli.options import Band, Json, Port, Serve
 from livebode.cli.section_options import with_keys
 from livebode.core import UsageError
@@ -87,7 +88,7 @@ def run_command(
     serve: Serve = False,
     port: Port = None,
     as_json: Json = False,
-) -> None:
+) -> Result:
     """Track the frequency response of a machine in a recording, or live until the source ends or Ctrl-C.
 
     Writes a run directory with responses.parquet, run.json, events.jsonl, bode.png and tracking.png; with several
@@ -108,7 +109,7 @@ def run_command(
         over["monitoring"]["baseline"] = over["monitoring"]["baseline"].absolute()
     from livebode.cli.running import run_targets  # with all that measures
 
-    run_targets(
+    return run_targets(
         [location(target) for target in targets], over, [] if as_matrix else output or [],
         output_only=output_only, band=band, out=out, force=force, serve=serve, port=port, as_json=as_json,
     )  # fmt: skip

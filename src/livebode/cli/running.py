@@ -20,6 +20,7 @@ import typer
 
 from livebode.cli import terminal
 from livebode.cli.failures import exit_code_of
+from livebode.cli.next_step import Result
 from livebode.cli.notices import NoticePrinter, PercentPrinter
 from livebode.cli.options import parsed_band
 from livebode.cli.pictures import draw, load_beside, tell_how_to_draw, tracked_amount
@@ -27,7 +28,7 @@ from livebode.cli.remote import recorded_at
 from livebode.cli.shell import command_line
 from livebode.configuration import Axes, Axis, ConfigurationFile, ServeSection
 from livebode.core import ConfigError, LocationError, RecordError, UsageError
-from livebode.estimates import rule
+from livebode.estimates import RESPONSE, rule
 from livebode.locations import Location, Url, local_copy, location, original
 from livebode.records import check_removable, is_run, to_json
 from livebode.runtime import (
@@ -62,7 +63,7 @@ def run_targets(
     serve: bool,
     port: int | None,
     as_json: bool,
-) -> None:
+) -> Result:
     """Run recordings or a configuration, with the sections that the options specify over it; print the result."""
     target = places[0]
     over = over | _output_only(target, output_only, outputs, band)
@@ -120,6 +121,13 @@ def run_targets(
                         axes, directory, force, as_json, file,
                         lambda name: subscribers_of(name or target.stem), send, publisher,
                     )  # fmt: skip
+    return Result("runs" if alone is None else _kind_of_result(alone), str(place))
+
+
+def _kind_of_result(axis: Axis) -> str:
+    if axis.kind != RESPONSE:
+        return "run"
+    return "responses" if axis.fit is None else "fitted run"
 
 
 def _check_places(directory: Path, axes: Axes, *, force: bool) -> None:
@@ -335,9 +343,9 @@ def _with_progress(job: Callable[[tuple[Subscriber, ...]], Outcome], quiet: bool
         countdown = Countdown()
         task = bar.add_task(_STEPS["opening"][0], total=1.0, countdown=countdown)
 
-        def show(done: float, **changes: str) -> None:
+        def show(done: float, description: str | None = None) -> None:
             countdown.reach(done)
-            bar.update(task, completed=done, **changes)
+            bar.update(task, completed=done, description=description)
 
         def show_progress(document: Document) -> None:
             if isinstance(document, RunStep):

@@ -50,7 +50,7 @@ def key_help(key: str) -> str:
     return _keys(section)[name].help
 
 
-def with_keys(**sections: Mapping[str, tuple[str, str]]) -> Callable[[Callable[..., None]], Callable[..., None]]:
+def with_keys(**sections: Mapping[str, tuple[str, str]]) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """A command with options in place of its parameter `sections`, which receives the keys that were specified.
 
     Parameters
@@ -61,19 +61,19 @@ def with_keys(**sections: Mapping[str, tuple[str, str]]) -> Callable[[Callable[.
     """
     options = {_parameter(s, key, *names): (s, key) for s, keys in sections.items() for key, names in keys.items()}
 
-    def decorated(command: Callable[..., None]) -> Callable[..., None]:
+    def decorated(command: Callable[..., Any]) -> Callable[..., Any]:
         signature = inspect.signature(command, eval_str=True)
         parameters: list[inspect.Parameter] = []
         for name, parameter in signature.parameters.items():
             parameters += options if name == "sections" else [parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY)]
 
         @wraps(command)
-        def collecting(**given: Any) -> None:
+        def collecting(**given: Any) -> Any:
             specified: dict[str, dict[str, Any]] = {}
             for parameter, (section, key) in options.items():
                 if (value := given.pop(parameter.name)) not in (None, []):
                     specified.setdefault(section, {})[key] = value
-            command(sections=specified, **given)
+            return command(sections=specified, **given)
 
         collecting.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
         collecting.__annotations__ = {one.name: one.annotation for one in parameters}

@@ -63,7 +63,7 @@ def chosen_model(section: FitSection, kinds: PlantKinds) -> fitting.PhysicalMode
     check_model(name, finished=False)
     if name == "auto":
         name = "two-mass-gain" if unknown_gain(section, kinds) else "two-mass"
-    elif name != "two-mass-gain" and (doubts := list(_units_not_si(name, kinds))):
+    elif name != "two-mass-gain" and (doubts := list(_units_not_si(name, section, kinds))):
         raise ConfigError(
             "unit-not-si",
             f"the parameters of fit.model = {name!r} are in SI units, but {_why(doubts)}",
@@ -78,6 +78,8 @@ def chosen_model(section: FitSection, kinds: PlantKinds) -> fitting.PhysicalMode
     # The gain model is of the motor's side only: naming it is no conflict.
     side = None if name == "two-mass-gain" and section.side == "motor" else section.side
     options: dict[str, Any] = {"side": side, "radius_m": section.radius_m, "inertia_ratio": section.inertia_ratio}
+    if name in fitting.MODELS and name != "two-mass-gain" and _is_linear(section, kinds):
+        options["linear"] = True
     if name == "two-mass-gain":
         options |= {"output_unit": kinds.output_unit, "input_unit": kinds.input_unit}
     return fitting.model_named(name, output=output, **options)
@@ -100,7 +102,9 @@ def unknown_gain(section: FitSection, kinds: PlantKinds) -> str:
     """Why "auto" is not two masses with parameters in SI units, and how to get them; empty if it is."""
     if section.model != "auto":
         return ""
-    doubts = [*_units_not_si("two-mass", kinds), *(_units_unknown(kinds) if section.radius_m is None else ())]
+    doubts = [*_units_not_si("two-mass", section, kinds), *(_units_unknown(kinds) if section.radius_m is None else ())]
+    if _is_linear(section, kinds):
+        return ""
     if not doubts and kinds.output_unit in ("m", "m/s") and not (section.radius_m and section.side == "load"):
         why = Message("{channel} is in {unit}", channel=repr(kinds.output_name), unit=kinds.output_unit)
         return _unknown(why, Message("set radius_m and side = 'load' in [fit]"))
@@ -113,9 +117,14 @@ def _unknown(why: str, remedy: str) -> str:
     )
 
 
-def _units_not_si(model: str, kinds: PlantKinds) -> Iterator[_UnitDoubt]:
+def _is_linear(section: FitSection, kinds: PlantKinds) -> bool:
+    """Whether a force moves masses along: a linear motor."""
+    return section.radius_m is None and kinds.input_unit == "N" and kinds.output_unit in ("m", "m/s")
+
+
+def _units_not_si(model: str, section: FitSection, kinds: PlantKinds) -> Iterator[_UnitDoubt]:
     """Of known units that are not those that the model needs."""
-    torque = model in fitting.MODELS
+    torque = model in fitting.MODELS and not _is_linear(section, kinds)
     if kinds.input_unit and (kinds.input_unit != "N m" if torque else kinds.input_unit not in SI_UNITS):
         yield _UnitDoubt(kinds.input_name, kinds.input_unit, "torque")
     if kinds.output_unit and kinds.output_unit not in SI_UNITS:
@@ -144,7 +153,7 @@ def _why(doubts: Sequence[_UnitDoubt]) -> str:
 
 def _remedy(doubts: Sequence[_UnitDoubt]) -> str:
     if doubts[0].unit == "N":
-        return Message("the model is driven by a torque")
+        return Message("a force drives masses only if the output is in m or m/s")
     entries = ", ".join(f'{_toml_key(doubt.name)} = "{_example(doubt)}"' for doubt in doubts)
     return Message("state what one unit is in [source] of axis.toml, as in {units}", units=f"units = {{ {entries} }}")
 
@@ -187,8 +196,9 @@ class FitSection(ConfigurationSection):
     Parameters
     ----------
     model
-        The model. "auto": two-mass if the input is a torque in N m and the output in rad or rad/s, as they are read,
-        or radius_m is given; otherwise two-mass-gain, and the result says why.
+        The model. "auto": two-mass if, as they are read, the input is a torque in N m and the output in rad or rad/s,
+        or a force in N and the output in m or m/s (linear motor), or radius_m is given; otherwise two-mass-gain, and
+        the result says why.
     output
         What the output is. "auto": by its kind, velocity if it has neither a unit nor a kind.
     side

@@ -20,6 +20,8 @@ from livebode.core._response import PER_RESPONSE as PER_RESPONSE
 from livebode.core._response import Response as Response
 from livebode.core._response import Responses as Responses
 from livebode.core._response import widened as widened
+from livebode.core._series import Series as Series
+from livebode.core._series import series_of as series_of
 from livebode.core._spectra import LEFT_OUT as LEFT_OUT
 from livebode.core._spectra import NOT_WHOLE as NOT_WHOLE
 from livebode.core._spectra import SPIKE as SPIKE
@@ -95,6 +97,7 @@ from livebode.core.errors import RecordError as RecordError
 from livebode.core.errors import RecordingError as RecordingError
 from livebode.core.errors import ServerError as ServerError
 from livebode.core.errors import SignalError as SignalError
+from livebode.core.errors import SignalWarning as SignalWarning
 from livebode.core.errors import SimulationError as SimulationError
 from livebode.core.errors import SourceError as SourceError
 from livebode.core.errors import StateError as StateError

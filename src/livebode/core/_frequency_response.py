@@ -82,6 +82,21 @@ measured line; the nearest are 50 and 60 Hz
         return self.lines.frequency_hz
 
     @property
+    def omega(self) -> Floats:
+        """Frequency of each line, rad/s, shape (lines,): 2π·`frequency_hz`, as python-control has it."""
+        return 2 * np.pi * self.lines.frequency_hz
+
+    @property
+    def magnitude(self) -> Floats:
+        """|value|, `unit`, shape (…, lines)."""
+        return np.abs(self.value)
+
+    @property
+    def phase(self) -> Floats:
+        """Phase of each value, rad, −π … π, shape (…, lines); not unwrapped."""
+        return np.angle(self.value)
+
+    @property
     def magnitude_db(self) -> Floats:
         """20·log10|value|, dB re 1 `unit`, shape (…, lines)."""
         return decibels(self.value)
@@ -123,6 +138,7 @@ measured line; the nearest are 50 and 60 Hz
         kind: PlotKind = "bode",
         *,
         axes: Any = None,
+        ax: Any = None,
         bounds: bool = True,
         c: float = CIRCLE_FACTOR,
         label: str | None = None,
@@ -142,6 +158,8 @@ measured line; the nearest are 50 and 60 Hz
         axes
             Matplotlib Axes to draw on: two for ``"bode"`` (magnitude, phase), one for the others. Default: a new figure
             of pyplot, with a legend.
+        ax
+            Another name of `axes`, as pandas has it.
         bounds
             Whether to draw the bounds.
         c
@@ -175,7 +193,10 @@ measured line; the nearest are 50 and 60 Hz
         ['plant', 'bound: 63.2 %']
         """
         draw = loaded("livebode.pictures:plot_responses")  # a floor above: pictures need what they show
+        axes = ax if axes is None else axes
         return draw(self._batch(), kind, axes=axes, c=c if bounds else None, label=label, color=color)
+
+    bode = plot
 
     def to_xarray(self) -> Dataset:
         """A labelled Dataset (extra `xarray`).

@@ -17,6 +17,7 @@ from livebode.core.distributions import CIRCLE_FACTOR, COVERAGE
 from livebode.core.errors import GridError
 from livebode.core.lines import Lines, ends
 from livebode.core.rows import RowArrays
+from livebode.plugins import loaded
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -80,6 +81,9 @@ class Response(FrequencyResponse):
     ready
         False where the machine was not ready at a sample of the window (`signals.ready`): the response is not
         assessed. True without such a channel.
+    estimator
+        How it was estimated, of a response of `livebode.frf`, `track` or `welch`: "joint", "direct", "lpm" or "welch".
+        Empty for others, whose settings have it.
 
     Examples
     --------
@@ -109,6 +113,7 @@ class Response(FrequencyResponse):
     weight: NDArray[np.complex128] = None  # type: ignore[assignment]
     distortion: Floats = None  # type: ignore[assignment]
     ready: bool = True
+    estimator: str = ""
 
     def __post_init__(self) -> None:
         _fill_unknown(self)
@@ -153,13 +158,14 @@ class Response(FrequencyResponse):
         return of_response(self)
 
     def _repr_html_(self) -> str:
-        return table_of_response(self)
+        return html_of_response(self)
 
 
 PER_RESPONSE = ("dof", "first", "sample", "time_s", "schedule", "ready")
 """Attributes with one value for the response."""
 
 _PER_ROW = PER_LINE + PER_RESPONSE
+_COMMON = ("lines", "quantity", "unit", "estimator")
 
 
 def _fill_unknown(of: Response | Responses) -> None:
@@ -207,8 +213,9 @@ class Responses(RowArrays, FrequencyResponse, Sequence[Response]):
     weight: NDArray[np.complex128] = None  # type: ignore[assignment]
     distortion: Floats = None  # type: ignore[assignment]
     ready: NDArray[np.bool_] = None  # type: ignore[assignment]
+    estimator: str = ""
 
-    _SHARED = ("lines", "quantity", "unit")
+    _SHARED = _COMMON
 
     def __post_init__(self) -> None:
         _fill_unknown(self)
@@ -223,7 +230,7 @@ class Responses(RowArrays, FrequencyResponse, Sequence[Response]):
         values: dict[str, Any] = {name: getattr(self, name)[rows] for name in _PER_ROW}
         for name in PER_RESPONSE:
             values[name] = values[name].item()
-        return Response(lines=self.lines, quantity=self.quantity, unit=self.unit, **values)
+        return Response(**values, **{name: getattr(self, name) for name in _COMMON})
 
     def between(self, from_s: float, to_s: float) -> Responses:
         """Responses whose effective time is in a range, ends included."""
@@ -262,6 +269,25 @@ class Responses(RowArrays, FrequencyResponse, Sequence[Response]):
         part = super().sel(frequency_hz=frequency_hz)
         return part if time_s == slice(None) else part.between(*ends(time_s, "time_s"))
 
+    def mean(self) -> Response:
+        """The mean of all rows, with the bound of a mean: `livebode.fitting.mean_response`, whose rules it follows.
+
+        Raises
+        ------
+        SignalError
+            If no line is ever valid.
+
+        Examples
+        --------
+        >>> from livebode import example_responses
+        >>> responses = example_responses()
+        >>> mean = responses.mean()
+        >>> mean.value.shape, bool(mean.bound().max() < responses[-1].bound().max())
+        ((13,), True)
+        """
+        mean: Responses = loaded("livebode.fitting:mean_response")(self)  # a floor above, as what draws
+        return mean[0]
+
     def _batch(self) -> Responses:
         return self
 
@@ -269,13 +295,13 @@ class Responses(RowArrays, FrequencyResponse, Sequence[Response]):
         return of_responses(self)
 
     def _repr_html_(self) -> str:
-        return table_of_responses(self)
+        return html_of_responses(self)
 
     @classmethod
     def of(cls, response: Response) -> Responses:
         """One Response as a batch of one."""
         rows: dict[str, Any] = {name: np.array([getattr(response, name)]) for name in _PER_ROW}
-        return cls(lines=response.lines, quantity=response.quantity, unit=response.unit, **rows)
+        return cls(**rows, **{name: getattr(response, name) for name in _COMMON})
 
     @classmethod
     def _not_alike(cls, _: Sequence[Responses]) -> GridError:
@@ -287,6 +313,8 @@ class Responses(RowArrays, FrequencyResponse, Sequence[Response]):
 
 
 _ROWS_MAX = 24
+_DRAWN_MAX = 2000
+"""Responses behind the newest one in the picture of a notebook."""
 _HEADS = ("frequency", "magnitude", "phase", f"bound ({100 * COVERAGE:g} %)", "coherence")
 
 
@@ -316,8 +344,26 @@ def of_responses(many: Responses) -> str:
     return f"<Responses: {len(many)} of {_named(many)}, {len(valid)} valid, {_span(many.lines)}, {times}>"
 
 
-def table_of_response(response: Response) -> str:
-    """HTML: a row for each line, thinned to `_ROWS_MAX`; lines that are not valid are grey."""
+def html_of_response(response: Response) -> str:
+    """HTML: all in a line, the Bode plot, and the values folded."""
+    return _paragraph(of_response(response)) + _picture(Responses.of(response)) + _table(response)
+
+
+def html_of_responses(many: Responses) -> str:
+    """HTML: all in a line, the Bode plot of the last ones, and the values of the newest valid one folded."""
+    newest = many.newest()
+    if newest is None:
+        return _paragraph(of_responses(many))
+    return _paragraph(of_responses(many)) + _picture(many[-_DRAWN_MAX:]) + _table(newest)
+
+
+def _picture(many: Responses) -> str:
+    drawn: str = loaded("livebode.pictures:picture_html")(many)  # a floor above, as what `plot` draws
+    return drawn
+
+
+def _table(response: Response) -> str:
+    """A row for each line, thinned to `_ROWS_MAX`; lines that are not valid are grey."""
     count = len(response.lines)
     shown = np.unique(np.linspace(0, count - 1, min(count, _ROWS_MAX)).round().astype(int))
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -333,13 +379,8 @@ def table_of_response(response: Response) -> str:
     rows = [_row(*row) for row in zip(*(part[shown] for part in values))]
     thinned = f"<caption>{len(rows)} of {count} lines</caption>" if len(rows) < count else ""
     heads = "".join(f"<th>{head}</th>" for head in _HEADS)
-    return f"{_paragraph(of_response(response))}<table>{thinned}<thead><tr>{heads}</tr></thead>{''.join(rows)}</table>"
-
-
-def table_of_responses(many: Responses) -> str:
-    """HTML: all in a line, and the newest valid one as a table."""
-    newest = many.newest()
-    return _paragraph(of_responses(many)) + ("" if newest is None else table_of_response(newest))
+    table = f"<table>{thinned}<thead><tr>{heads}</tr></thead>{''.join(rows)}</table>"
+    return f"<details><summary>values</summary>{table}</details>"
 
 
 def _row(f: float, db: float, deg: float, share: float, coherence: float, valid: bool) -> str:
@@ -355,7 +396,8 @@ def _paragraph(text: str) -> str:
 
 
 def _named(of: Response | Responses) -> str:
-    return f"{of.quantity} in {of.unit}" if of.unit else str(of.quantity)
+    named = f"{of.quantity} in {of.unit}" if of.unit else str(of.quantity)
+    return f"{named}, {of.estimator} estimate" if of.estimator else named
 
 
 def _span(lines: Lines) -> str:

@@ -194,7 +194,7 @@ class Trends:
         fit_s, values = nan, None
         if chosen and len(chosen) == len(names) and all(len(times) == len(chosen[0][0]) for times, _ in chosen):
             of_names = np.stack([value for _, value in chosen], axis=1)
-            row = _nearest(chosen[0][0], np.isfinite(of_names).all(axis=1), time_s)
+            row = _nearest(chosen[0][0], np.asarray(np.isfinite(of_names).all(axis=1)), time_s)
             if row is not None:
                 fit_s, values = float(chosen[0][0][row]), of_names[row]
         plain = [item for trend, rows in known for item in trend.plain(_row(rows, fit_s, time_s))]
@@ -234,8 +234,8 @@ def _row(rows: TrendRows, fit_s: float, time_s: float) -> TrendRows:
         row = int(same[-1])
         return rows[row : row + 1]
     near_s = time_s if np.isnan(fit_s) else fit_s
-    known = np.isfinite(rows.value).any(axis=1)
-    row = _nearest(rows.time_s, known if known.any() else np.ones(len(rows), dtype=bool), near_s) or 0
+    known = np.asarray(np.isfinite(rows.value).any(axis=1))
+    row = _nearest(rows.time_s, known | ~known.any(), near_s) or 0
     return rows[row : row + 1]
 
 

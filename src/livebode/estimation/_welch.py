@@ -3,37 +3,34 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from livebode.core import Block, Lines, Response, SignalError, UsageError, needing
+from livebode.core import Lines, Response, SignalError, UsageError, needing, series_of
 from livebode.estimation.products import power
 from livebode.estimation.quotient import independent_windows
 
+_SEGMENTS = 8
+
 
 def welch(
-    block: Block,
-    *,
-    input: str,
-    output: str,
-    excitation: str | None = None,
-    window: int,
-    overlap: float = 0.5,
-    taper: str = "hann",
+    *signals: ArrayLike, fs: float, window: int | None = None, overlap: float = 0.5, taper: str = "hann"
 ) -> Response:
     """H1 = S_uy/S_uu, or with an excitation the joint estimate S_wy/S_wu, from averaged tapered segments.
 
     Nevaranta 2016, eqs. (1), (2) and coherence (18). The lines are all bins of the window between 0 and the Nyquist
     frequency. H1 is biased in closed loop; the joint estimate is not. Both are biased where the response
     changes within the taper's width (about 4 bins for Hann), worst at a lightly damped resonance. For an excitation
-    that is periodic in the window use the Tracker, which has no such bias.
+    that is periodic in the window use `livebode.frf` or the Tracker, which have no such bias.
 
     Parameters
     ----------
-    block
-        The recording, all samples finite.
-    input, output, excitation
-        Channel names.
+    *signals
+        ``(u, y)`` or ``(w, u, y)``: input and output, or excitation, input and output; each of shape (samples,), all
+        samples finite. Arrays, lists or columns, as in `livebode.frf`.
+    fs
+        Samples per second.
     window
-        Segment length, samples.
+        Segment length, samples. Default: an eighth of the samples.
     overlap
         Overlap of neighbouring segments as a share of their length, 0 … 0.9.
     taper
@@ -42,23 +39,29 @@ def welch(
     Returns
     -------
     Response
-        Its effective time is the middle of the recording. `sigma` is from the power that the response does not
+        Its effective time is the middle of the samples. `sigma` is from the power that the response does not
         explain, `dof` the number of independent segments less one.
 
     Raises
     ------
     LivebodeError
-        If the recording is shorter than two segments or has non-finite samples.
+        If the signals are shorter than two segments or have non-finite samples.
 
     Examples
     --------
     >>> rng = np.random.default_rng(1)
     >>> u = rng.standard_normal(20_000)
-    >>> block = Block(np.array([u, 2 * u]), ("u", "y"), rate_hz=1000)
-    >>> response = welch(block, input="u", output="y", window=200)
+    >>> response = welch(u, 2 * u, fs=1000, window=200)
     >>> len(response.lines), response.value[0].round(6), response.coherence[0].round(6)
     (99, np.complex128(2+0j), np.float64(1.0))
     """
+    if len(signals) not in (2, 3):
+        raise UsageError(
+            "wrong-shape",
+            f"welch got {len(signals)} signals",
+            "call welch(u, y, fs=4000) or, with the excitation, welch(w, u, y, fs=4000)",
+            argument="signals",
+        )
     if not 0 <= overlap <= 0.9:
         raise UsageError(
             "out-of-range",
@@ -69,29 +72,29 @@ def welch(
             low=0,
             high=0.9,
         )
-    lines = Lines(tuple(range(1, (window + 1) // 2)), window, block.rate_hz)
+    found = series_of(**dict(zip("wuy"[-len(signals) :], signals)))
+    u, y, w = (found[name].values for name in ("u", "y", "w" if len(signals) == 3 else "u"))
+    window = max(3, u.size // _SEGMENTS) if window is None else window
+    lines = Lines(tuple(range(1, (window + 1) // 2)), window, fs)
     step = window - int(overlap * window)
-    segments = 1 + (len(block) - window) // step
+    segments = 1 + (u.size - window) // step
     if segments < 2:
         raise SignalError(
             "too-short",
-            f"{len(block)} samples are less than two segments of {window}",
+            f"{u.size} samples are less than two segments of {window}",
             "take a shorter window",
-            samples=len(block),
+            samples=u.size,
             window=window,
         )
-    u, y = block[input], block[output]
-    w = u if excitation is None else block[excitation]
     if not np.isfinite(u.sum() + y.sum() + w.sum()):
         raise SignalError("not-finite", "the recording has samples that are not finite", "cut it before or after them")
 
+    last = window + (segments - 1) * step - 1
     with needing("SciPy", "analysis", "the estimator welch"):
         from scipy import signal  # takes half a second to import
 
     def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-        _, s = signal.csd(
-            a, b, fs=block.rate_hz, window=taper, nperseg=window, noverlap=window - step, detrend="constant"
-        )
+        _, s = signal.csd(a, b, fs=fs, window=taper, nperseg=window, noverlap=window - step, detrend="constant")
         return np.asarray(s[1 : len(lines) + 1])
 
     s_wy, s_wu, s_ww = cross(w, y), cross(w, u), cross(w, w).real
@@ -109,7 +112,8 @@ def welch(
         dof=independent - 1,
         coherence=coherence,
         valid=np.isfinite(value),
-        first=block.start,
-        sample=block.start + window + (segments - 1) * step - 1,
-        time_s=float(block.time_s[[0, window + (segments - 1) * step - 1]].mean()),
+        first=0,
+        sample=last,
+        time_s=last / 2 / fs,
+        estimator="welch",
     )

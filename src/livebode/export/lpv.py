@@ -66,7 +66,7 @@ class LpvModel:
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the parameters: Js, JL or mL, Keff, bs, B, BL, delay."""
-        return ("Js", "JL" if self.radius_m is None else "mL", "Keff", "bs", "B", "BL", "delay")
+        return ("Js", "mL" if "mL" in self.parameters.names else "JL", "Keff", "bs", "B", "BL", "delay")
 
     @property
     def position(self) -> Floats:

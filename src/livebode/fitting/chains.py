@@ -35,11 +35,14 @@ class Chain(PhysicalModel):
     radius_m
         Of the pulley, for a load that moves along: it then is a mass in kg, stiffness in N/m, damping in N s/m, and the
         load's output in m/s or m. None for one that turns: kg m², N m/rad, N m s/rad, rad/s or rad.
+    linear
+        The motor moves along too: a force in N drives masses in kg, and the output is in m/s or m.
     """
 
     output: Literal["velocity", "position"] = "velocity"
     side: Literal["motor", "load"] = "motor"
     radius_m: float | None = None
+    linear: bool = False
 
     def __post_init__(self) -> None:
         _check_choice("output", self.output, ["velocity", "position"])
@@ -68,20 +71,33 @@ class Chain(PhysicalModel):
         return self.radius_m if self.radius_m is not None and self.side == "load" else 1.0
 
     def _load(self, name: str) -> Parameter:
-        if self.radius_m is None:
+        if not self._moves_along:
             return Parameter(f"J{name}", "kg m²", 1e-2, *_INERTIA)
         return Parameter(f"m{name}", "kg", 10.0, *_MASS)
 
     def _spring(self, name: str) -> Parameter:
-        unit = "N m/rad" if self.radius_m is None else "N/m"
+        unit = "N/m" if self._moves_along else "N m/rad"
         return Parameter(name, unit, 1e4, *_STIFFNESS)
 
     def _damper(self, name: str) -> Parameter:
-        unit = "N m s/rad" if self.radius_m is None else "N s/m"
+        unit = "N s/m" if self._moves_along else "N m s/rad"
         return Parameter(name, unit, 10.0, *_DAMPING)
 
     def _motor(self) -> Parameter:
-        return Parameter("Js", "kg m²", 1e-2, *_INERTIA)
+        return Parameter("Js", self._inertia_unit, 1e-2, *_INERTIA)
+
+    @property
+    def _moves_along(self) -> bool:
+        """Whether the load does."""
+        return self.linear or self.radius_m is not None
+
+    @property
+    def _inertia_unit(self) -> str:
+        return "kg" if self.linear else "kg m²"
+
+    @property
+    def _friction_unit(self) -> str:
+        return "N s/m" if self.linear else "N m s/rad"
 
     def shown(self, values: Floats, grid: EvaluationGrid) -> Floats:
         """Frictions that stop the motor's inertia in as long as ten of the lowest line's radians take."""
@@ -110,8 +126,8 @@ class Rigid(Chain):
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:  # type: ignore[override]
-        inertia = Parameter("J", "kg m²", 1e-2, *_INERTIA)
-        return (inertia, free_friction("B", "N m s/rad"), delay())
+        inertia = Parameter("J", self._inertia_unit, 1e-2, *_INERTIA)
+        return (inertia, free_friction("B", self._friction_unit), delay())
 
     def transfer(self, inertia: Any, friction: Any) -> tuple[list[Any], list[Any]]:
         return [self.lever], [inertia, friction] + [0.0] * (self.integrators - 1)
@@ -135,6 +151,8 @@ class TwoMass(Chain):
 
     >>> TwoMass(radius_m=0.019).names
     ('Js', 'mL', 'Keff', 'bs', 'B', 'BL', 'delay')
+    >>> TwoMass(linear=True).units[:4]
+    ('kg', 'kg', 'N/m', 'N s/m')
     >>> TwoMass(inertia_ratio=2.0).derived_names[-1]
     'inertia_ratio'
     """
@@ -157,7 +175,7 @@ class TwoMass(Chain):
     @property
     def parameters(self) -> tuple[Parameter, ...]:  # type: ignore[override]
         load = () if self.inertia_ratio is not None else (self._load("L"),)
-        frictions = free_friction("B", "N m s/rad"), free_friction("BL", self._damper("bs").unit)
+        frictions = free_friction("B", self._friction_unit), free_friction("BL", self._damper("bs").unit)
         return (self._motor(), *load, self._spring("Keff"), self._damper("bs"), *frictions, delay())
 
     def transfer(self, *parameters: Any) -> tuple[list[Any], list[Any]]:

@@ -234,6 +234,7 @@ class RunningMean:
             schedule=np.array([self._schedule / self._scheduled if self._scheduled else np.nan]),
             quantity=newest.quantity,
             unit=newest.unit,
+            estimator=newest.estimator,
             input_coherence=self._input_coherence.value[np.newaxis],
             distortion=np.where(valid & np.isfinite(distortion), distortion, np.nan)[np.newaxis],
         )

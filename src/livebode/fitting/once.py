@@ -176,7 +176,7 @@ class Fit:
         response = self.model.at(self._values(), EvaluationGrid(f.ravel(), self.rate_hz, self.hold))
         return np.asarray(response.reshape(f.shape))
 
-    def to_control(self, discrete: bool = False) -> Any:
+    def to_tf(self, discrete: bool = False) -> Any:
         """python-control TransferFunction (extra `control`): in s, without the delay; or in z, behind hold and delay.
 
         Raises

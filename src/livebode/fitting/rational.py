@@ -269,7 +269,7 @@ class Rational:
         """The system in s whose zero-order-hold equivalent this is; see `to_continuous`."""
         return to_continuous(self.numerator, self.denominator, self.rate_hz)
 
-    def to_control(self) -> Any:
+    def to_tf(self) -> Any:
         """python-control TransferFunction in z (extra `control`)."""
         try:
             import control

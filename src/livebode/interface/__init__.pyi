@@ -2,6 +2,9 @@ from livebode.interface._examples import example_axis as example_axis
 from livebode.interface._examples import example_responses as example_responses
 from livebode.interface._examples import example_run as example_run
 from livebode.interface._experiment import design as design
+from livebode.interface._frf import frf as frf
+from livebode.interface._frf import track as track
+from livebode.interface._open import open as open
 from livebode.interface._run import Run as Run
 from livebode.interface.example_recordings import EXAMPLES as EXAMPLES
 from livebode.interface.example_recordings import Example as Example

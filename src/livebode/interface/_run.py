@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from functools import cached_property, partial
 from html import escape
 from os import PathLike
@@ -27,13 +28,17 @@ from livebode.core import (
 )
 from livebode.fitting import Fit
 from livebode.locations import Url, local_copy, location, shared_copy
-from livebode.pictures import plot_responses
+from livebode.pictures import picture_html, plot_responses
 from livebode.plugins import loaded, named
 from livebode.records import PARAMETERS, RunRecord
 from livebode.tables import Table
 
 if TYPE_CHECKING:
     import numpy as np
+
+
+_PICTURED_VALUES_MAX = 1 << 22
+"""Responses × lines of a run that are read, in about a second, because a notebook shows it."""
 
 
 class Run:
@@ -165,6 +170,7 @@ class Run:
         kind: PlotKind = "bode",
         *,
         axes: Any = None,
+        ax: Any = None,
         bounds: bool = True,
         c: float = CIRCLE_FACTOR,
         label: str | None = None,
@@ -182,10 +188,12 @@ class Run:
         """
         average = self._averaged
         words = label or "average"
-        bound = c if bounds else None
+        bound, axes = c if bounds else None, ax if axes is None else axes
         return plot_responses(
             average.overview, kind, axes=axes, c=bound, label=words, color=color, front=average.response
         )
+
+    bode = plot
 
     def fit(
         self,
@@ -279,6 +287,36 @@ class Run:
             loop = recorded_loop(self._record.summary).build(self.lines.rate_hz)
         return loop_report(fit or self.fit(), self._averaged.words, responses, loop).margins
 
+    def widget(self, every_s: float = 1.0) -> Any:
+        """A widget of a notebook that follows the run while it is being written (extra `notebook`).
+
+        Parameters
+        ----------
+        every_s
+            Seconds between two looks at the record.
+
+        Returns
+        -------
+        anywidget.AnyWidget
+            The newest response with its bound, in front of those before it.
+
+        Raises
+        ------
+        ExtraError
+            If anywidget is not installed.
+
+        Examples
+        --------
+        >>> import livebode, tempfile
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     widget = livebode.example_run(f"{folder}/monday").widget()
+        >>> widget.finished, widget.html[:49]
+        (True, '<div>Run monday: &lt;Responses: 40 of plant in ra')
+        """
+        from livebode.interface._widget import RunWidget
+
+        return RunWidget(self.path, every_s)
+
     def analysis(self, name: str) -> Callable[..., Any]:
         """The analysis of this name that a plug-in adds, to be called with its options (docs/how-to/plugin.md).
 
@@ -316,7 +354,16 @@ class Run:
 
     def _repr_html_(self) -> str:
         rows = "".join(f"<li>{escape(fact)}</li>" for fact in self._facts())
-        return f"<div>Run <b>{escape(self.path.name)}</b><ul>{rows}</ul></div>"
+        return f"<div>Run <b>{escape(self.path.name)}</b><ul>{rows}</ul>{self._picture()}</div>"
+
+    def _picture(self) -> str:
+        """The average as HTML; none of a run that is not finished, too long to be read for it, or without one."""
+        responses = self.summary.get("counts", {}).get("responses", 0)
+        if not self.finished or self.entries or responses * len(self.lines) > _PICTURED_VALUES_MAX:
+            return ""
+        with suppress(LivebodeError):
+            return picture_html(self._averaged.overview, self.average)
+        return ""
 
     def _facts(self) -> list[str]:
         signals = self.summary.get("configuration", {}).get("signals") or {}

@@ -23,6 +23,7 @@ from livebode.pictures.map import frequency_edges as frequency_edges
 from livebode.pictures.matrix import matrix_figure as matrix_figure
 from livebode.pictures.matrix import save_matrix_pictures as save_matrix_pictures
 from livebode.pictures.matrix import singular_values_figure as singular_values_figure
+from livebode.pictures.notebook import picture_html as picture_html
 from livebode.pictures.plots import FEW_LINES as FEW_LINES
 from livebode.pictures.plots import alone as alone
 from livebode.pictures.plots import band as band

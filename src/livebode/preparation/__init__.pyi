@@ -20,6 +20,7 @@ from livebode.preparation.configuring import tables_of as tables_of
 from livebode.preparation.contents import ChannelSummary as ChannelSummary
 from livebode.preparation.contents import contents_of as contents_of
 from livebode.preparation.followers import LIVE_RESPONSES_PER_S as LIVE_RESPONSES_PER_S
+from livebode.preparation.followers import follower_of as follower_of
 from livebode.preparation.followers import live_follower as live_follower
 from livebode.preparation.followers import make_follower as make_follower
 from livebode.preparation.followers import make_settings as make_settings
@@ -28,13 +29,13 @@ from livebode.preparation.inspection import inspect as inspect
 from livebode.preparation.part import chosen_part as chosen_part
 from livebode.preparation.part import configured_part as configured_part
 from livebode.preparation.part import motion_part as motion_part
+from livebode.preparation.plan import Recorded as Recorded
 from livebode.preparation.plan import beginnings as beginnings
 from livebode.preparation.plan import hop_event as hop_event
 from livebode.preparation.plan import roles_in_doubt as roles_in_doubt
 from livebode.preparation.plan import window_in_doubt as window_in_doubt
 from livebode.preparation.proposal import Guess as Guess
 from livebode.preparation.proposal import Proposals as Proposals
-from livebode.preparation.proposal import Recorded as Recorded
 from livebode.preparation.quiet import Quiet as Quiet
 from livebode.preparation.quiet import silences as silences
 from livebode.preparation.recordings import check_same as check_same

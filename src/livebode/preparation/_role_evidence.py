@@ -165,11 +165,9 @@ def _in_bands(x: Floats, y: Floats, rate_hz: float) -> tuple[Floats, Complex, Fl
     starts, f = _bands(x.size, rate_hz)
     if len(f) < 2:
         return None
-    spectra = [_whole_spectrum(signal) for signal in (x, y)]
-    cross, of_x, of_y = (
-        np.add.reduceat(product, starts)[:-1]
-        for product in (spectra[1] * spectra[0].conj(), np.abs(spectra[0]) ** 2, np.abs(spectra[1]) ** 2)
-    )
+    of_input, of_output = _whole_spectrum(x), _whole_spectrum(y)
+    cross = np.add.reduceat(of_output * of_input.conj(), starts)[:-1]
+    of_x, of_y = (np.add.reduceat(np.abs(z) ** 2, starts)[:-1] for z in (of_input, of_output))
     density = of_x / np.diff(starts)
     coherence = np.where(density > _POWER * density.max(), np.abs(cross) ** 2 / (of_x * of_y), 0.0)
     return f, cross / of_x, coherence, int(np.diff(starts).min())

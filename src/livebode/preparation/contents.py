@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from livebode.core import Block, Channel, QuantityKind, RecordingError
+from livebode.preparation.plan import RecordedSource
 from livebode.sources import Log, Skipped, UnevenLog
 
 _UNREADABLE_MAX = 16
@@ -71,7 +72,7 @@ def read_contents(log: Log, names: Sequence[str], required: Sequence[str]) -> Co
             names = left
 
 
-def contents_of(log: Log, names: Sequence[str]) -> Contents:
+def contents_of(log: RecordedSource, names: Sequence[str]) -> Contents:
     if isinstance(log, UnevenLog):
         return _uneven_contents(log, names)
     summaries: dict[str, ChannelSummary] = {}

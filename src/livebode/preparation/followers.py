@@ -15,7 +15,7 @@ LIVE_RESPONSES_PER_S = 20.0
 
 def make_follower(axis: Axis, log: Log) -> Follower:
     """A Tracker for this recording, or with [motion] a MotionCorrection; LivebodeError if they do not fit."""
-    return _follower(axis, make_settings(axis, log))
+    return follower_of(axis, make_settings(axis, log))
 
 
 def live_follower(axis: Axis, rate_hz: float, layout: SpectraLayout | None = None) -> Follower:
@@ -36,10 +36,11 @@ def live_follower(axis: Axis, rate_hz: float, layout: SpectraLayout | None = Non
         )
     lines = Lines.parse(frequencies, rate_hz, window, rounded=not axis.tracking.periodic)
     hop = axis.tracking.hop or nearest_hop(lines.window, rate_hz / LIVE_RESPONSES_PER_S)
-    return _follower(axis, settings_of(axis, rate_hz, lines, hop))
+    return follower_of(axis, settings_of(axis, rate_hz, lines, hop))
 
 
-def _follower(axis: Axis, settings: Settings) -> Follower:
+def follower_of(axis: Axis, settings: Settings) -> Follower:
+    """What follows samples with these settings of the axis; ConfigError if its [motion] does not fit them."""
     if not settings.periodic:
         if axis.motion is not None:
             raise ConfigError(

@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 
 from livebode.configuration import Axis
-from livebode.core import ANY_EXCITATION, Block, ConfigError, Event, Lines, LivebodeError
+from livebode.core import ANY_EXCITATION, Block, Channel, ConfigError, Event, Lines, LivebodeError
 from livebode.estimation import FORGETTING, RippleOrder, Settings, default_hop, divisors
 from livebode.language import Message
 from livebode.preparation.checks import check_length
@@ -90,7 +90,7 @@ def recorded_hop(axis: Axis, log: Log, lines: Lines) -> int | None:
     changes are timed, has the usual hop.
     """
     timed = axis.signals.schedule or axis.motion or axis.monitoring.baseline or axis.signals.ready
-    if axis.tracking.hop or timed or len(axis.source.logs) > 1:
+    if axis.tracking.hop or timed or log.samples is None:
         return None
     least = log.samples * len(lines) / RECORDED_VALUES_MAX
     if least <= default_hop(lines.window):
@@ -104,8 +104,8 @@ def hop_event(axis: Axis, log: Log, settings: Settings) -> list[Event]:
     if settings.step != recorded_hop(axis, log, settings.lines):
         return []
     message = Message(
-        "the recording is long: a response every {hop} samples, not every {usual}, so that the run is small; --hop "
-        "{usual} gives all of them",
+        "the recording is long: it has a response every {hop} samples, so that the run is small; --hop {usual} gives "
+        "the usual number",
         hop=settings.step,
         usual=usual,
     )
@@ -124,6 +124,27 @@ class RecordedSource(Protocol):
     def first(self) -> int: ...
 
     def blocks(self, channels: Sequence[str] | None = None) -> Iterator[Block]: ...
+
+
+class Recorded(RecordedSource, Protocol):
+    """Samples that can be read again: a Log, or what a live source sent."""
+
+    @property
+    def path(self) -> object: ...
+
+    @property
+    def format(self) -> str: ...
+
+    @property
+    def channels(self) -> tuple[Channel, ...]: ...
+
+    @property
+    def rate_hz(self) -> float: ...
+
+    @property
+    def samples(self) -> int | None: ...
+
+    def naming(self, names: Sequence[str]) -> Recorded: ...
 
 
 def window_in_doubt(axis: Axis, log: Log, settings: Settings) -> list[Event]:
@@ -219,7 +240,7 @@ def make_lines(axis: Axis, log: Log) -> Lines:
     return Lines.parse(frequencies, log.rate_hz, recognise(samples, log.rate_hz, doubtful=True).period)
 
 
-def beginning(log: Log, channel: str, samples: int = SEARCHED) -> np.ndarray:
+def beginning(log: RecordedSource, channel: str, samples: int = SEARCHED) -> np.ndarray:
     """The first samples of a channel, from `log.first` on, with NaN where some are missing."""
     return np.asarray(beginnings(log, [channel], samples)[0])
 

@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
 
 import numpy as np
 
 from livebode.arrays import Floats
-from livebode.core import Channel
 from livebode.language import Message
 from livebode.preparation._role_evidence import RoleEvidence
 from livebode.preparation._role_spectra import DRIVING, NAMED_INPUT, NAMED_OUTPUT, ChannelQuantities
 from livebode.preparation.contents import ChannelSummary, contents_of
-from livebode.preparation.plan import RecordedSource, beginnings
+from livebode.preparation.plan import Recorded, beginnings
 
 _SEARCHED = 1 << 18  # samples: enough for some periods of an excitation
 _CERTAIN = 3  # score of a proposal
@@ -28,27 +26,6 @@ _LAGS_ALIKE = 0.2  # of the lines: two responses that lag the input so alike can
 _EXCITATION = re.compile(r"^(w|exc\w*|dither|inject\w*|multisine|prbs|chirp|sweep|anregung)$")
 _COMMAND = re.compile(r"(ref|set|target|cmd|command|soll|demand|desired)")
 _SCHEDULE = re.compile(r"^(x|pos\w*|stroke|travel|cart\w*)$")
-
-
-class Recorded(RecordedSource, Protocol):
-    """Samples that can be read again: a Log, or what a live source sent."""
-
-    @property
-    def path(self) -> object: ...
-
-    @property
-    def format(self) -> str: ...
-
-    @property
-    def channels(self) -> tuple[Channel, ...]: ...
-
-    @property
-    def rate_hz(self) -> float: ...
-
-    @property
-    def samples(self) -> int | None: ...
-
-    def naming(self, names: Sequence[str]) -> Recorded: ...
 
 
 @dataclass(frozen=True)

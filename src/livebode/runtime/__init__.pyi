@@ -24,6 +24,7 @@ from livebode.runtime.estimate import RunContext as RunContext
 from livebode.runtime.estimate import check_channels as check_channels
 from livebode.runtime.feed import Feed as Feed
 from livebode.runtime.fits import Fits as Fits
+from livebode.runtime.in_memory import follow_recording as follow_recording
 from livebode.runtime.readiness import ENDED as ENDED
 from livebode.runtime.readiness import SUPPRESSED as SUPPRESSED
 from livebode.runtime.readiness import Readiness as Readiness

@@ -47,7 +47,11 @@ def examined_recordings(axis: Axis, logs: Sequence[Log], to: Destination) -> Exa
         return examined_uneven(axis, log)
     log = configured_part(axis, log)
     to.announce(RunStep("lines"))
-    follower = make_follower(axis, log)
+    return examined_recording(axis, log, make_follower(axis, log), to)
+
+
+def examined_recording(axis: Axis, log: Log, follower: Follower, to: Destination) -> ExaminedRecording:
+    """A recording, examined as a whole, and tracked by this follower."""
     log = log.naming(axis.signals.named)
     estimate = SingleResponse.of(axis, follower, log.channels)
     log = log.naming(estimate.channels)  # with the covariates of a baseline

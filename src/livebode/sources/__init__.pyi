@@ -31,6 +31,7 @@ from livebode.sources.resample import Resampler as Resampler
 from livebode.sources.steps import Gap as Gap
 from livebode.sources.steps import exact_rate_hz as exact_rate_hz
 from livebode.sources.timing import Timing as Timing
+from livebode.sources.timing import time_rank as time_rank
 from livebode.sources.uneven import ClockGroup as ClockGroup
 from livebode.sources.uneven import UnevenLog as UnevenLog
 from livebode.sources.uneven import uneven_log_of as uneven_log_of

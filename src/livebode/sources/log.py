@@ -254,6 +254,18 @@ class Log:
         labels = tuple(self._label(column, name) for name, column in zip(names, columns))
         return self._within(self._cut(self._read(columns, limit), labels, limit))
 
+    def __getitem__(self, name: str) -> NDArray[np.float64]:
+        """All samples of one channel in memory, shape (samples,), with NaN where some are missing; errors as `blocks`.
+
+        Sample n is at index n − `first`.
+        """
+        parts: list[NDArray[np.float64]] = []
+        stop = self.first
+        for block in self.blocks([name]):
+            parts += [np.full(block.start - stop, np.nan), block[name]]
+            stop = block.stop
+        return np.concatenate(parts) if parts else np.zeros(0)
+
     def has(self, name: str) -> bool:
         """Whether `blocks` can read or compute a channel of this name."""
         try:

@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -83,6 +84,15 @@ def test_a_cancelled_live_run_is_complete(jobs: Jobs, tmp_path: Path) -> None:
     assert ended(job).state == "done", job.plain()
     assert job.code == 0
     assert has_responses(tmp_path / "live")
+
+
+@pytest.mark.parametrize("after_s", [0.0, 0.05, 0.2, 0.5, 1.0])
+def test_a_job_that_is_cancelled_while_it_starts_says_what_ctrl_c_would(jobs: Jobs, after_s: float) -> None:
+    job = jobs.start(DEMO)
+    time.sleep(after_s)
+    jobs.cancel(job.id)
+    assert ended(job).state == "stopped"
+    assert job.sentence in ("stopped; nothing was written", "stopped; no file is half written")
 
 
 def test_a_killed_job_says_so_and_another_one_can_start(jobs: Jobs) -> None:

@@ -11,6 +11,7 @@ from livebode.core.errors.computation import (
     GridError,
     MeasurementError,
     SignalError,
+    SignalWarning,
     SimulationError,
     TuneError,
 )
@@ -45,6 +46,7 @@ __all__ = [
     "RecordingError",
     "ServerError",
     "SignalError",
+    "SignalWarning",
     "SimulationError",
     "SourceError",
     "StateError",

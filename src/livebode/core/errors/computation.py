@@ -20,9 +20,8 @@ class SignalError(LivebodeError):
     Examples
     --------
     >>> import livebode
-    >>> block = livebode.Block([[0.0] * 10, [1.0] * 10], ("u", "y"), rate_hz=1000)
     >>> try:
-    ...     livebode.welch(block, input="u", output="y", window=20)
+    ...     livebode.welch([0.0] * 10, [1.0] * 10, fs=1000, window=20)
     ... except livebode.SignalError as error:
     ...     print(error.code)
     signal.too-short
@@ -230,6 +229,17 @@ class MeasurementError(LivebodeError):
         "played-differs": "The recorded excitation is not the designed one.",
         "silent": "The samples ended while the excitation was played; it was ramped down.",
     }
+
+
+class SignalWarning(UserWarning):
+    """A finding on the signals of `livebode.frf` or `livebode.track`: missing samples, doubtful roles, a drift.
+
+    Examples
+    --------
+    >>> import warnings
+    >>> with warnings.catch_warnings():
+    ...     warnings.simplefilter("error", SignalWarning)  # a finding stops the program
+    """
 
 
 class SimulationError(LivebodeError):

@@ -406,7 +406,7 @@ function status() {
   if (!facts) return;
   const known = { up, facts, health };
   document.body.classList.toggle("not-begun", !facts.begun);
-  const [word, look] = lamp(known, timeline.span, timeline.atS !== null);
+  const [word, look] = lamp(known, timeline.span, timeline.atS !== null && timeline.following);
   $("lamp").className = `lamp ${look}`;
   // The long name of an entry is in the choice beside it: twice there, the header would need a second row.
   $("status-text").textContent = facts.begun && facts.matrix ? word : `${facts.name} · ${word}`;
@@ -471,7 +471,7 @@ function draw(now) {
   }
   if (due("fits", 0)) {
     showResult(page.facts);
-    if (page.tab === "margins") margins.draw(timeline.atS !== null);
+    margins.draw(timeline.atS !== null); // on paper it is shown in every tab
   }
   if (due("additions", 0)) for (const part of Object.values(additions)) part.draw();
   if (due("read", TEXT_MS)) {

@@ -174,7 +174,11 @@ function covered({ u, bode, index, px }, box) {
 export const marginWords = (bode) =>
   ofLoop(bode)
     ? marksOf(bode)
-        .map(({ words, hz }) => tr("{margin} at {hz} Hz", { margin: words, hz: plain(hz, 3) }))
+        .map(({ words, hz, chart, of }) => {
+          const name = chart ? tr("phase margin") : tr("gain margin");
+          const margin = of ? `${name} ${words}` : words;
+          return tr("{margin} at {hz} Hz", { margin, hz: plain(hz, 3) });
+        })
         .join(" · ")
     : "";
 

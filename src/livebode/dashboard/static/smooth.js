@@ -21,8 +21,8 @@ const polar = (size, angle) => [size * Math.cos(angle), size * Math.sin(angle)];
 const split = (values) => [values.map(([re]) => re), values.map(([, im]) => im)];
 
 /**
- * Cubics over log f, with the slopes of parabolas through three neighbours: of 1/G where |G| is concave, as at a resonance,
- * since 1/G is almost a parabola there; else of G.
+ * Cubics over log f, with the slopes of parabolas through three neighbours: of G or of 1/G, whichever parabolas to the left and
+ * to the right differ less. Near a resonance 1/G is almost a parabola, near an antiresonance G.
  *
  * @param {Numbers} hz
  * @param {number[]} db
@@ -45,7 +45,7 @@ export function smooth(hz, db, deg, round) {
   };
   for (let i = 0; i < last; i++) {
     add(direct[i], deg[i]);
-    const peak = slope(t, db, Math.max(0, i - 1)) > slope(t, db, Math.min(last - 1, i + 1)),
+    const peak = unlike(t, inverted, i) < unlike(t, plain, i),
       parts = peak ? inverted : plain;
     for (let part = 1; part < PARTS; part++) {
       const found = /** @type {Complex} */ (parts.map((v) => between(t, v, i, part / PARTS)));
@@ -65,6 +65,16 @@ function between(t, v, i, share) {
     rise = v[i + 1] - v[i],
     [a, b] = [wide * tangent(t, v, i), wide * tangent(t, v, i + 1)];
   return v[i] + share * (a + share * (3 * rise - 2 * a - b + share * (a + b - 2 * rise)));
+}
+
+/** How much the parabolas on both sides of an interval differ, relative to the values. @param {number[]} t @param {number[][]} parts @param {number} i */
+const unlike = (t, parts, i) =>
+  Math.hypot(...parts.map((v) => bend(t, v, i) - bend(t, v, i + 1))) / Math.hypot(...parts.map((v) => v[i] + v[i + 1]));
+
+/** Of the parabola through a point and its neighbours. @param {number[]} t @param {number[]} v @param {number} at */
+function bend(t, v, at) {
+  const k = Math.min(Math.max(at, 1), t.length - 2);
+  return (slope(t, v, k) - slope(t, v, k - 1)) / (t[k + 1] - t[k - 1]);
 }
 
 /** Of the parabola through a point and its neighbours. @param {number[]} t @param {number[]} v @param {number} at */

@@ -144,7 +144,7 @@ def _controller(experiment: Experiment) -> Player:
         raise ConfigError(
             "key-missing",
             "the experiment has no [source]: the controller that plays and records",
-            "add it; wings/design/docs/measure.md has an example; --simulated tries it without a machine",
+            "add it; wings/design/docs/measure.md has an example",
             key="source",
         )
     return make_player(experiment.source, experiment.measure, experiment.signal_names()["excitation"])

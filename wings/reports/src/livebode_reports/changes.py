@@ -76,7 +76,10 @@ def changes(of: RunDifferences) -> Changes:
             words = Message("No parameters: the fit to {run} was rejected: {why}.", run=run.path.name, why=fit.sentence)
             return Changes((), words, (), Message("No margins: they need a fit."))
     # A quality factor is the damping ratio again.
-    rows = [{name: row for name, *row in fit.rows() if not name.endswith("_q")} for fit in fits]
+    rows = [
+        {name: (value, bound, unit) for name, value, bound, unit in fit.rows() if not name.endswith("_q")}
+        for fit in fits
+    ]
     quantities = _table(rows)
     words = Message(
         "The {model} model, fitted to the compared responses at {lines} lines.",

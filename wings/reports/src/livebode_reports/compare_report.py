@@ -162,7 +162,7 @@ class Comparison:
             tones=TONES_OF_A_COMPARISON,
             answers=self._answers(),
             about_answers=tr("Change from before to after. ± covers all changes of the table together with 95 %."),
-            result=first_page.result(self._in_short(), accepted),
+            result=first_page.result(tuple(self._in_short()), accepted),
             picture=self.picture(),
             signatures=first_page.signatures(header),
             appendix=(self.response(), *(self.appendix() if appendix else ())),

@@ -139,7 +139,7 @@ def details(of: RunData) -> Section:
 def _options(tracking: dict[str, Any], of: ReportData) -> list[str]:
     parts = []
     if tracking.get("average"):
-        forgetting = of.run.found["forgetting"]
+        forgetting = of.run.found.get("forgetting", 1)  # a matrix averages all its repetitions
         all_periods = tr("averaged over all periods")
         some = tr("averaged over periods with forgetting {forgetting:g}", forgetting=forgetting)
         parts.append(all_periods if forgetting == 1 else some)

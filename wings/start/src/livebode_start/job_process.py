@@ -19,14 +19,17 @@ def main() -> None:
     nothing = os.open(os.devnull, os.O_RDONLY)
     os.dup2(nothing, 0)
     os.close(nothing)
-    threading.Thread(target=_interrupt_at_end, args=(server,), daemon=True).start()
-    from livebode.cli import main as run_command_line
-    from livebode.cli import print_percent
-
-    print_percent()
-
     sys.argv[0] = "livebode"  # as the help calls it
-    run_command_line()
+    try:
+        threading.Thread(target=_interrupt_at_end, args=(server,), daemon=True).start()
+        from livebode.cli import main as run_command_line
+        from livebode.cli import print_percent
+
+        print_percent()
+        run_command_line()
+    except KeyboardInterrupt:  # before the command line has begun, or while it ends
+        print("livebode: stopped; nothing was written", file=sys.stderr)
+        sys.exit(128 + signal.SIGINT)
 
 
 def _interrupt_at_end(server: int) -> None:

@@ -20,6 +20,7 @@ from livebode.records import to_json
 from livebode_start.jobs import JobOrder, Jobs
 from livebode_start.preview import POINTS_MAX
 from livebode_start.recordings import Choices, OpenedRecording, OpenedRecordings, proposed
+from livebode_start.results import Results
 from livebode_start.uploads import UPLOAD_BYTES_MAX, Uploads
 from livebode_start.workspace import Workspace
 
@@ -153,6 +154,8 @@ class MeasurePages:
     def _proposed(self, choices: Choices) -> tuple[str, dict[str, Any]]:
         """Name of configuration and run, and the answer to the page."""
         opened = self._opened(choices.recording, choices.rate_hz)
+        if choices.baseline:
+            Results(self._workspace.directory).check("baselines", choices.baseline)
         stem = self._workspace.free_stem(Path(opened.name).stem)
         answer = proposed(opened, choices).plain(opened.name)
         return stem, answer | {"command": f"livebode run {stem}.toml --out={stem}", "file": f"{stem}.toml"}

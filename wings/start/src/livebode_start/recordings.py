@@ -50,6 +50,9 @@ class Choices(BaseModel):
         Lines and window.
     estimator, average, model
         Keys of the configuration.
+    baseline
+        Name of a learned baseline of the directory, with which the run is compared; each response is then of its own
+        window, without an average.
     """
 
     model_config = ConfigDict(extra="forbid")
@@ -62,6 +65,7 @@ class Choices(BaseModel):
     estimator: str | None = Field(None, max_length=20)
     average: bool | None = None
     model: str | None = Field(None, max_length=60)
+    baseline: str | None = Field(None, max_length=_NAME_MAX)
 
     @classmethod
     def read(cls, data: bytes) -> Choices:
@@ -206,12 +210,14 @@ def proposed(opened: OpenedRecording, choices: Choices) -> ProposedConfiguration
     log = chosen_part(opened.log, choices.begin_s, choices.end_s, 0, _no_periods)
     estimator, reason = suitable_estimator(log, signals)
     estimator = choices.estimator or estimator
-    average = "schedule" not in signals if choices.average is None else choices.average
+    average = "schedule" not in signals and not choices.baseline if choices.average is None else choices.average
     model = choices.model or "none"
     source = {
         "log": opened.name, "rate_hz": choices.rate_hz, "from": choices.begin_s, "to": choices.end_s
     }  # fmt: skip
     tables = tables_of(source, signals, estimator=estimator, average=average, model=model)
+    if choices.baseline:
+        tables["monitoring"] = {"baseline": f"baselines/{choices.baseline}.json"}
     if choices.lines is not None:
         tables["lines"] = choices.lines.model_dump()
     reasons = {role: _reason(opened, role, name) for role, name in signals.items()}

@@ -60,12 +60,17 @@ class Results:
         rows = [self._row(name, place, files) for name, place, files in self._results(folder)]
         return sorted(rows, key=lambda row: row["written"], reverse=True)[:_LISTED_MAX]
 
+    def check(self, folder: str, name: str) -> None:
+        """ServerError if there is no result of this name."""
+        if name not in (listed for listed, _, _ in self._results(folder)):
+            raise _absent()
+
     def file(self, folder: str, name: str, file: str) -> ResultFile:
         """A file of a result; ServerError if it is not listed."""
         for listed, place, files in self._results(folder):
             if listed == name and file in files:
                 return ResultFile(file, read_bytes(place, file, FILE_BYTES_MAX), _SHOWN.get(Path(file).suffix))
-        raise ServerError("file-unknown", Message("this file is not here any more"), Message("reload the page"))
+        raise _absent()
 
     def _results(self, folder: str) -> Iterator[tuple[str, Path, list[str]]]:
         """Name, directory and files of each result."""
@@ -90,6 +95,10 @@ class Results:
             "written": max(status.st_mtime for _, status in sizes),
         }
         return row | {"choices": _choices(place)} if _FACTS in files else row
+
+
+def _absent() -> ServerError:
+    return ServerError("file-unknown", Message("this file is not here any more"), Message("reload the page"))
 
 
 def _choices(design: Path) -> list[list[str]]:

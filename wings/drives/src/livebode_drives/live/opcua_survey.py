@@ -43,7 +43,7 @@ def survey(settings: SourceKeys, seconds: float) -> Survey:
         If the server cannot be reached or rejects the connection.
     """
     try:
-        import asyncua
+        from asyncua import Client, ua
     except ImportError:
         raise not_installed(
             "opc.tcp needs the package asyncua, which is not installed", package="asyncua", extra="opcua"
@@ -51,8 +51,8 @@ def survey(settings: SourceKeys, seconds: float) -> Survey:
     logging.getLogger("asyncua").setLevel(logging.CRITICAL)  # its remarks are about its own defaults
     address = str(parse_address(str(settings.url)))
     try:
-        return asyncio.run(_survey(asyncua.Client(address, timeout=REQUEST_S), str(settings.url), seconds))
-    except (OSError, asyncua.ua.UaError) as error:
+        return asyncio.run(_survey(Client(address, timeout=REQUEST_S), str(settings.url), seconds))
+    except (OSError, ua.UaError) as error:  # type: ignore[attr-defined]
         raise SourceError(
             "no-samples",
             f"the server does not answer ({type(error).__name__}: {error})"[:200],
@@ -96,7 +96,7 @@ async def _unit(node: Any) -> str:
 
     try:
         unit = await (await node.get_child("0:EngineeringUnits")).read_value()
-    except ua.UaError:
+    except ua.UaError:  # type: ignore[attr-defined]
         return ""
     return str(unit.DisplayName.Text or "")
 

@@ -50,6 +50,7 @@ const frequencies = $("frequencies", HTMLInputElement),
   estimator = $("estimator", HTMLSelectElement),
   average = $("average", HTMLInputElement),
   model = $("model", HTMLSelectElement),
+  baseline = $("baseline", HTMLSelectElement),
   from = $("from", HTMLInputElement),
   to = $("to", HTMLInputElement),
   measure = $("measure", HTMLButtonElement);
@@ -108,6 +109,7 @@ function show(facts) {
     estimator: edited.has(estimator) ? estimator.value : null,
     average: edited.has(average) ? average.checked : null,
     model: edited.has(model) ? model.value : null,
+    baseline: baseline.value || null,
   });
 
   function settle() {
@@ -152,7 +154,7 @@ function show(facts) {
     }
   }
 
-  for (const field of [frequencies, window_, estimator, average, model, from, to])
+  for (const field of [frequencies, window_, estimator, average, model, baseline, from, to])
     field.addEventListener("input", () => {
       edited.add(field);
       if (field === from || field === to) used();
@@ -180,6 +182,11 @@ function show(facts) {
     settle();
   });
   measure.addEventListener("click", run);
+  json("/api/task", { task: "learn" })
+    .then(({ results }) => {
+      for (const { name } of results) baseline.append(element("option", { value: name }, name));
+    })
+    .catch(complain);
   signals.mark(roles.chosen);
   signals.fetch();
   propose();
