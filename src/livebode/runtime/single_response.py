@@ -65,7 +65,7 @@ def drift_events(drift: Mapping[str, Any], sample: int, time_s: float) -> list[E
     most = max(drift["lines"], key=lambda line: line["percent"])
     message = Message(
         "the response drifts during the recording, most at {line_hz:g} Hz: by {percent:.2g} % ± "
-        "{bound_percent:.1g} % from the beginning to the end; the bound of a mean contains the drift; for the machine "
+        "{bound_percent:.2g} % from the beginning to the end; the bound of a mean contains the drift; for the machine "
         "at one time, run a part of the recording (--from, --to)",
         line_hz=most["frequency_hz"],
         percent=most["percent"],

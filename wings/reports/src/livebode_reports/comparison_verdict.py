@@ -136,9 +136,7 @@ def _about(table: tuple[QuantityChange, ...], unchanged: str) -> Iterator[Findin
     """The changes, the most important first; if there are none, what would have been detected."""
     ranked = by_importance(table)
     if changed := [c for c in ranked if c.significant]:
-        together = trn(
-            "± covers the change with 95 %.", "± covers all {n} changes of the table together with 95 %.", len(table)
-        )  # fmt: skip
+        together = tr("± covers all changes of the table together with 95 %.")
         listing = "; ".join(f"{quantity_name(c.name)} {in_percent(c)}" for c in changed[:_CHANGES_MAX])
         yield Finding("differs", f"{listing}. {together}")
     elif ranked:

@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 
 from livebode.configuration import LoopSection
-from livebode.core import Loop
+from livebode.core import INTERVAL_FACTOR, Loop
 from livebode_control.loop_check.loop_changes import LoopChange, single_changes
 from livebode_control.loop_check.loop_equation import LoopResidual, LoopSignals
 from livebode_control.loop_check.loop_images import held_paths
@@ -22,7 +22,6 @@ HARMLESS = 5e-4
 """Share of the signals, and relative change of a number, that is below the accuracy of any description."""
 _ALIKE = 10.0  # of twice the log-likelihood: odds of 150 to 1
 _STEPS_MAX = 25  # of the search for a value
-_Z95 = 1.96
 
 
 @dataclass(frozen=True, eq=False)
@@ -251,7 +250,7 @@ def _explained(signals: LoopSignals, change: LoopChange) -> Explanation:
         phase = min(_phases(loop(start)), key=lambda phase: judged(phase)(value).deviance)
         fits.append(_fitted(judged(phase), value, change.least))
     value, sigma, residual = min(fits, key=lambda fit: fit[2].deviance)
-    return Explanation(change, value, _Z95 * sigma, residual, residual.p(fitted=1))
+    return Explanation(change, value, INTERVAL_FACTOR * sigma, residual, residual.p(fitted=1))
 
 
 def _phases(loop: Loop) -> range:

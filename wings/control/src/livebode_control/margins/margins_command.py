@@ -86,7 +86,7 @@ def _show_margins(margins: Margins) -> None:
         mark = "by the model, between the lines" if margins.place[0, i] == "interpolated" else "EXTRAPOLATED"
         known = "" if bound[i] < abs(value) else ", not known"
         print(f"  {MARGIN_WORDS[name]:22}{value:>10.4g} ± {bound[i]:<9.2g}{unit:4} at {f:<7.4g} Hz, {mark}{known}")
-    print("  ± is 1.96 sigma from the covariance of the fit; no line checks the model where it is EXTRAPOLATED")
+    print("  ± covers 95 %, from the covariance of the fit; no line checks the model where it is EXTRAPOLATED")
 
 
 def _show_tuning(tuning: Tuning) -> None:
