@@ -107,7 +107,7 @@ def _heard(url: str, rate: float | None) -> tuple[Recorded, dict[str, Any]]:
         raise SourceError(
             "no-samples",
             heard.trouble or "the channels have no samples in common",
-            f"see what arrives: {command_line('livebode', 'inspect', url)}",
+            "compare it with what livebode reads (docs/how-to/live.md), and correct the address or the sender",
             address=url,
         ).at(url)
     block = heard.block if rate is None else replace(heard.block, rate_hz=rate)
@@ -281,11 +281,12 @@ def _check_signals(signals: Mapping[str, str], names: Sequence[str], path: str) 
             argument="output",
         )
     alone = command_line("livebode", "run", path, "--output-only", "--output", signals["output"])
+    modes = f"the modes are found by {alone}"
     if not {"excitation", "input"} & set(signals):
         raise UsageError(
             "missing",
             f"neither an excitation nor an input is recognised among {', '.join(names)}",
-            f"give --excitation and --input; of an output alone the modes are found by {alone}",
+            "give --excitation and --input" + ("" if is_live(path) else f"; of an output alone {modes}"),
             options=["--excitation", "--input"],
         )
     if "input" not in signals:

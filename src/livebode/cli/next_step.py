@@ -28,10 +28,13 @@ class Result:
         A key of `NEXT`.
     place
         Its path or URL.
+    options
+        Options that the command which follows needs too, as its rate.
     """
 
     kind: str
     place: str
+    options: tuple[str, ...] = ()
 
 
 def next_line(result: Result) -> str | None:
@@ -43,4 +46,5 @@ def next_line(result: Result) -> str | None:
     from livebode.plugins import named
 
     words = [word.format(place=result.place) if word == "{place}" else word for word in NEXT[result.kind]]
+    words += result.options
     return f"Next: {command_line('livebode', *words)}" if words[0] in named("commands") else None
