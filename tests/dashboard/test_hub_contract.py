@@ -24,7 +24,7 @@ from livebode.dashboard.notices import CAUSES_MAX, EventCauses, event_id
 from livebode.dashboard.quantities import QUANTITIES
 from livebode.dashboard.recent import POINTS_MAX, RECORDED_VALUES_MAX, ModelTrend, RecentResponses, TrendRows
 from livebode.dashboard.state import State
-from livebode.runtime import ClockSet, RunControl, RunEnded, RunStarted, TrackerResults
+from livebode.runtime import ClockSet, RunControl, RunEnded, RunStarted, RunStep, TrackerResults
 from livebode.simulation.two_mass_loop import RATE_HZ
 from livebode.sources.live import LiveBlock
 from tests.support.dashboards import LINES, LOOP, Watched, begin
@@ -213,8 +213,7 @@ def test_a_run_that_is_being_completed_is_not_silent(tmp_path: Path, by_person: 
     hub = Hub("axis")
     state = State("axis", 0, hub)
     begin(hub, tmp_path, LINES)
-    total = None if by_person else 800
-    hub(TrackerResults(Block(np.zeros((1, 400)), ("u",), RATE_HZ, start=0), 400, total))
+    hub(TrackerResults(Block(np.zeros((1, 400)), ("u",), RATE_HZ, start=0), 400, None))
     hub.followed_s -= 60
     state.refresh()
     assert (state.silence()[1], verdict(state).word) == (True, "silent")
@@ -222,7 +221,7 @@ def test_a_run_that_is_being_completed_is_not_silent(tmp_path: Path, by_person: 
         assert hub.control is not None
         hub.control.end()
     else:
-        hub(TrackerResults(Block(np.zeros((1, 400)), ("u",), RATE_HZ, start=400), 800, total))
+        hub(RunStep("ending"))
     hub.followed_s -= 60
     assert (state.silence()[1], verdict(state).word, state.health()["ending"]) == (False, "no-baseline", True)
 

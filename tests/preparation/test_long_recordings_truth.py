@@ -35,8 +35,9 @@ def test_a_long_recording_has_fewer_responses_by_default_and_the_same_mean(tmp_p
     short, full = tmp_path / "short", tmp_path / "full"
     done = command("run", log, *roles, *lines, "--out", short)
     assert done.code == 0, done.err
-    words = " ".join(done.err.split())
-    assert "a response every 25 samples, so that the run is small; --hop 20 gives the usual number" in words
+    assert "a response every 25 samples, so that the run is small; --hop 20 gives the usual number" in " ".join(
+        done.err.split()
+    )
     asked = command("run", log, *roles, *lines, "--hop", 20, "--out", full)
     assert "the recording is long" not in asked.err
     few, all_ = livebode.Run(short), livebode.Run(full)

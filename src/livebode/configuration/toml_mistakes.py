@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import tomllib
 from collections.abc import Callable, Iterator
 
 _AT_LINE = re.compile(r"\(at line (\d+), ")  # tomllib has no attribute for it before Python 3.14
@@ -23,28 +22,8 @@ def mistake_at(error: str, text: str) -> tuple[int, str] | None:
     return int(found[1]), lines[int(found[1]) - 1].strip()
 
 
-def meant_line(line: str) -> str | None:
-    r"""The line of TOML that was probably meant, which is one; None if nothing usual is wrong.
-
-    >>> meant_line('log = "C:\\data\\log.csv"'), meant_line("output = velocity"), meant_line('output: "y"')
-    ("log = 'C:\\data\\log.csv'", 'output = "velocity"', 'output = "y"')
-    >>> meant_line("rate_hz = 0,5  # kHz"), meant_line("average = True"), meant_line("frequencies: 20:140:20")
-    ('rate_hz = 0.5  # kHz', 'average = true', 'frequencies = "20:140:20"')
-    >>> meant_line("output = “y”"), meant_line("// my axis"), meant_line('output = "y'), meant_line("[source")
-    ('output = "y"', '# my axis', 'output = "y"', '[source]')
-    """
-    return next((meant for meant in _candidates(line) if meant != line and _is_toml(meant)), None)
-
-
-def _is_toml(line: str) -> bool:
-    try:
-        tomllib.loads(line)
-    except ValueError:
-        return False
-    return True
-
-
-def _candidates(line: str) -> Iterator[str]:
+def meant_lines(line: str) -> Iterator[str]:
+    """What was perhaps meant by a line that is not TOML, the more usual mistakes first."""
     colon = re.sub(rf"^{_KEY}:\s*", lambda found: f"{found[1].rstrip()} = ", line)
     for start in (line, colon):
         yield start

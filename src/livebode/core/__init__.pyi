@@ -12,9 +12,9 @@ from livebode.core._frequency_response import PER_LINE as PER_LINE
 from livebode.core._frequency_response import PlotKind as PlotKind
 from livebode.core._frequency_response import Quantity as Quantity
 from livebode.core._frequency_response import decibels as decibels
+from livebode.core._loop import CHANNELS_MAX as CHANNELS_MAX
 from livebode.core._loop import Loop as Loop
 from livebode.core._loop import MatrixLoop as MatrixLoop
-from livebode.core._matrix_responses import CHANNELS_MAX as CHANNELS_MAX
 from livebode.core._matrix_responses import REASONS as REASONS
 from livebode.core._matrix_responses import MatrixResponses as MatrixResponses
 from livebode.core._response import PER_RESPONSE as PER_RESPONSE

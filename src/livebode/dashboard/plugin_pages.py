@@ -136,7 +136,7 @@ def _classes(group: Literal["pages", "workspaces"]) -> dict[str, Any]:
 def files_of_additions(workspaces: Mapping[str, WorkspacePages]) -> dict[str, bytes]:
     """Static files of what plug-ins add, with the scripts that name it to the pages, and its styles as one file."""
     additions = page_additions()
-    folders = [page.static for page in (*additions.values(), *workspaces.values())]
+    folders = [*(page.static for page in additions.values()), *(pages.static for pages in workspaces.values())]
     files = {path.name: path.read_bytes() for folder in folders for path in sorted(folder.iterdir())}
     styles = b"".join(content for name, content in files.items() if name.endswith(".css"))
     return files | {

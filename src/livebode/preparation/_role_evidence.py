@@ -25,7 +25,7 @@ _CHANNELS_MAX = 24  # each is compared with each where none repeats
 
 
 @dataclass(frozen=True, eq=False)
-class Answer:
+class ChannelAnswer:
     """Response of a channel to a reference, shape (lines,), in the order of the lines' frequency."""
 
     frequency_hz: Floats
@@ -52,7 +52,7 @@ class RoleEvidence:
     def __init__(self, samples: Mapping[str, Floats], rate_hz: float) -> None:
         self._samples, self._rate_hz = samples, rate_hz
         self._lines: dict[str, tuple[Lines | None, bool]] = {}
-        self._answers: dict[str, dict[str, Answer]] = {}
+        self._answers: dict[str, dict[str, ChannelAnswer]] = {}
 
     def period(self, name: str) -> tuple[int, bool]:
         """Samples after which a channel repeats, 0 if it does not, and whether only rounding differs."""
@@ -64,14 +64,14 @@ class RoleEvidence:
             self._lines[name] = _repeating(self._samples[name], self._rate_hz)
         return self._lines[name]
 
-    def answers(self, reference: str) -> Mapping[str, Answer]:
+    def answers(self, reference: str) -> Mapping[str, ChannelAnswer]:
         """The channels that respond to a reference, at its lines."""
         if reference not in self._answers:
             self._answers[reference] = self._responding(reference)
         return self._answers[reference]
 
-    def _responding(self, reference: str) -> dict[str, Answer]:
-        found: dict[str, Answer] = {}
+    def _responding(self, reference: str) -> dict[str, ChannelAnswer]:
+        found: dict[str, ChannelAnswer] = {}
         for name in self._samples:
             spectrum = None if name == reference else self._spectrum(reference, name)
             if spectrum is None:
@@ -80,7 +80,7 @@ class RoleEvidence:
             responds = coherence > limit(len(f), windows)  # False for NaN, of a line without power
             if np.sum(responds) > 1:
                 f, response = f[responds], response[responds]
-                found[name] = Answer(f, response, direct(response[f >= f[-1] / 2]))
+                found[name] = ChannelAnswer(f, response, direct(response[f >= f[-1] / 2]))
         return found
 
     def _spectrum(self, reference: str, name: str) -> tuple[Floats, Complex, Floats, int] | None:
@@ -170,7 +170,7 @@ def _in_bands(x: Floats, y: Floats, rate_hz: float) -> tuple[Floats, Complex, Fl
     of_x, of_y = (np.add.reduceat(np.abs(z) ** 2, starts)[:-1] for z in (of_input, of_output))
     density = of_x / np.diff(starts)
     coherence = np.where(density > _POWER * density.max(), np.abs(cross) ** 2 / (of_x * of_y), 0.0)
-    return f, cross / of_x, coherence, int(np.diff(starts).min())
+    return f, np.asarray(cross / of_x, np.complex128), coherence, int(np.diff(starts).min())
 
 
 def _repeating(samples: Floats, rate_hz: float) -> tuple[Lines | None, bool]:

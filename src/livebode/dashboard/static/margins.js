@@ -92,7 +92,7 @@ export class Margins {
       );
     }
     // It belongs to the newest response, so it is not shown for a time in the past.
-    if (lines && !paused)
+    if (lines?.frequency_hz && !paused)
       rows.push(
         element(
           "tr",

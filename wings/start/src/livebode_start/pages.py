@@ -31,16 +31,19 @@ class StartPages:
     def __init__(self, directory: Path) -> None:
         self._workspace = Workspace(directory)
         self._jobs = Jobs(self._workspace.directory)
+        self._measure: MeasurePages | None = None
 
     def routes(self, board: Board, file: Callable[[str], Response], order: Order) -> list[BaseRoute]:
         """Routes of the pages."""
-        measure = MeasurePages(self._workspace, self._jobs, board, file, order)
+        measure = self._measure = MeasurePages(self._workspace, self._jobs, board, file, order)
         tasks = TaskPages(self._workspace.directory, self._jobs, board, file, order)
         return [*JobPages(self._jobs, board, order).routes, *measure.routes, *tasks.routes]
 
     async def run(self) -> None:
-        """Wait until it is cancelled; then end the jobs."""
+        """Wait until it is cancelled; then end the reading and the jobs."""
         try:
             await asyncio.Event().wait()
         finally:
+            if self._measure is not None:
+                self._measure.close()
             self._jobs.close()

@@ -43,7 +43,8 @@ def survey(settings: SourceKeys, seconds: float) -> Survey:
         If the server cannot be reached or rejects the connection.
     """
     try:
-        from asyncua import Client, ua
+        from asyncua import ua
+        from asyncua.client.client import Client
     except ImportError:
         raise not_installed(
             "opc.tcp needs the package asyncua, which is not installed", package="asyncua", extra="opcua"
