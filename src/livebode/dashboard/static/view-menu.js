@@ -66,7 +66,7 @@ export function viewMenu(button, panel, bode, fittedDelayMs) {
     bode.rebuild();
     mark();
   };
-  const mark = () => button.classList.toggle("changed", Boolean(view.words));
+  const mark = () => button.classList.toggle("changed", view.inDrive || Boolean(view.words));
   /** @param {Option} option @param {string} words @param {[string, string][]} choices */
   const choice = (option, words, choices) => {
     const select = element(
