@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ from livebode.records import RunRecord
 from tests.support.browser import Tab, chromium
 from tests.support.command import livebode
 from tests.support.start_pages import CHANNELS, drop, start_page
-from tools.two_mass_servo import Servo, write_servo
+from tools.two_mass_servo import LOAD, MOTOR, STIFFNESS, Servo, write_servo
 
 PHONE = {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobile": True}
 
@@ -47,6 +48,25 @@ def test_from_a_csv_to_a_bode_plot_with_bounds_without_toml(tmp_path: Path) -> N
         assert tab.wrong == []
     np.testing.assert_allclose(shown_db, 20 * np.log10(np.abs(newest(folder / "servo").value[0])), atol=0.01)
     check_truth(folder / "servo")
+
+
+def test_the_largest_text_of_a_measured_servo_is_its_resonance_in_the_language_of_the_reader(tmp_path: Path) -> None:
+    log = write_servo(tmp_path / "servo.csv")
+    with start_page(tmp_path / "runs") as url, chromium() as browser:
+        with Tab(browser, url, wait=False, locale="de") as tab:
+            drop(tab, log)
+            assert tab.page.inner_text("#role-schedule-reason") == "kein Kanal bietet sich an"
+            assert tab.page.inner_text("#role-input-reason") == "ein Drehmoment in N m"
+            assert tab.page.inner_text("#lines-found").endswith(" Linien, 4 … 600 Hz")
+            assert tab.page.inner_text("#window-found") == "Abtastwerte: 0,5 s, eine Periode"
+            tab.page.click("#measure")
+            tab.page.wait_for_url("**/run/servo/")
+            tab.page.wait_for_function("() => /^Resonanz/.test(document.getElementById('headline').innerText)")
+            headline = tab.page.inner_text("#headline")
+            assert tab.wrong == []
+    value, bound = (float(n.replace(",", ".")) for n in re.findall(r"[\d,]+", headline)[:2])
+    truth_hz = np.sqrt(STIFFNESS * (1 / MOTOR + 1 / LOAD)) / (2 * np.pi)
+    assert abs(value - truth_hz) < 2 * bound < 0.5
 
 
 def test_the_configuration_is_what_inspect_writes_and_the_terminal_runs(

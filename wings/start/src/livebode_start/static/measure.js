@@ -33,10 +33,10 @@ import { plain } from "./words.js";
  * @typedef {object} Configuration
  * @property {string} text
  * @property {{frequencies: string, window: number} | null} lines
- * @property {string} lines_found
- * @property {string} window_found
+ * @property {Words} lines_found
+ * @property {Words} window_found
  * @property {string} estimator
- * @property {string} estimator_reason
+ * @property {Words} estimator_reason
  * @property {boolean} average
  * @property {string} model
  * @property {Words[]} doubts
@@ -95,7 +95,7 @@ function show(facts) {
     settle();
   });
   for (const name of facts.estimators) estimator.append(element("option", { value: name }, name));
-  for (const name of facts.models) model.append(element("option", { value: name }, name));
+  for (const name of facts.models) model.append(element("option", { value: name }, name === "none" ? tr("none") : name));
   from.placeholder = plain(facts.begin_s, 6);
   to.placeholder = plain(facts.end_s, 6);
 
@@ -207,10 +207,10 @@ function fill(found) {
     frequencies.value = found.lines?.frequencies ?? "";
     window_.value = found.lines ? String(found.lines.window) : "";
   }
-  $("lines-found").textContent = found.lines_found;
-  $("window-found").textContent = found.window_found;
+  $("lines-found").textContent = worded(found.lines_found);
+  $("window-found").textContent = worded(found.window_found);
   estimator.value = found.estimator;
-  $("estimator-found").textContent = found.estimator_reason;
+  $("estimator-found").textContent = worded(found.estimator_reason);
   average.checked = found.average;
   model.value = found.model;
   $("text").textContent = found.text;
@@ -219,7 +219,7 @@ function fill(found) {
   const doubts = found.doubts.map((doubt) => worded(doubt));
   $("ready").textContent = doubts.length
     ? doubts.join(" ")
-    : [found.lines_found, tr("ready to measure")].filter(Boolean).join(" · ");
+    : [worded(found.lines_found), tr("ready to measure")].filter(Boolean).join(" · ");
   $("ready").className = doubts.length ? "doubt" : "";
   measure.disabled = false;
 }
