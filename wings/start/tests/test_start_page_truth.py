@@ -176,6 +176,26 @@ def test_only_beside_a_directory_in_the_working_one_recordings_are_offered(
     assert [row["name"] for row in Workspace(Path("runs")).recordings()] == ["../servo.csv"]
 
 
+def test_a_measurement_is_followed_and_can_be_cancelled_after_a_reload_in_the_middle(tmp_path: Path) -> None:
+    folder = tmp_path / "runs"
+    with start_page(folder) as url, chromium() as browser, Tab(browser, url, wait=False) as tab:
+        drop(tab, write_servo(tmp_path / "servo.csv", Servo(periods=400)))
+        tab.page.click("#measure")
+        tab.page.wait_for_selector(".job button")
+        tab.page.reload()
+        tab.page.click(".job button")
+        tab.page.wait_for_selector("#ready.wrong")
+        assert "cancelled" in tab.page.inner_text("#ready")
+        tab.page.reload()  # a job that has ended is not followed again
+        tab.page.wait_for_selector("#measure:enabled")
+        tab.page.click("#measure")
+        tab.page.wait_for_selector(".job button")
+        tab.page.reload()
+        tab.page.wait_for_url("**/run/servo-2/")
+        assert tab.wrong == []
+    assert newest(folder / "servo-2").time_s[0] > 50
+
+
 def test_a_measurement_is_cancelled_and_nothing_is_half_written(tmp_path: Path) -> None:
     folder = tmp_path / "runs"
     with start_page(folder) as url, chromium() as browser, Tab(browser, url, wait=False) as tab:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
@@ -112,6 +112,7 @@ class OpenedRecording:
     source: Mapping[str, Any]
     log: Log
     heard: Mapping[str, Any] | None = None
+    _newest: tuple[Choices, ProposedConfiguration] | None = field(default=None, init=False, repr=False)
 
     @cached_property
     def proposals(self) -> Proposals:
@@ -161,6 +162,18 @@ class OpenedRecording:
                 for role, guess in self.guesses.items()
             },
         }
+
+    def proposed(self, choices: Choices) -> ProposedConfiguration:
+        """The configuration of these choices, found and checked as `livebode inspect --out` does it.
+
+        Raises
+        ------
+        LivebodeError
+            If the recording contradicts them, or they do not suffice.
+        """
+        if self._newest is None or self._newest[0] != choices:  # the lines of a long recording take seconds
+            self._newest = choices, _found(self, choices)
+        return self._newest[1]
 
     @cached_property
     def guesses(self) -> dict[str, Guess]:
@@ -231,14 +244,7 @@ class OpenedRecordings:
         return self._opened[key]
 
 
-def proposed(opened: OpenedRecording, choices: Choices) -> ProposedConfiguration:
-    """The configuration of these choices, found and checked as `livebode inspect --out` does it.
-
-    Raises
-    ------
-    LivebodeError
-        If the recording contradicts them, or they do not suffice.
-    """
+def _found(opened: OpenedRecording, choices: Choices) -> ProposedConfiguration:
     signals: dict[str, str] = {role: name for role, name in choices.signals.items() if name}
     _check_signals(signals)
     log = chosen_part(opened.log, choices.begin_s, choices.end_s, 0, _no_periods)
