@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from livebode.cli import terminal
 from livebode.cli.live_survey import is_live
-from livebode.cli.next_step import Result
+from livebode.cli.next_step import NextCommand
 from livebode.cli.shell import command_line
 from livebode.core import (
     LivebodeError,
@@ -64,7 +64,7 @@ def write_configuration(
     yes: bool,
     force: bool,
     as_json: bool,
-) -> Result:
+) -> NextCommand:
     """Write the configuration of a recording: list its channels, propose their roles, ask, and find lines and window.
 
     What is given is not asked for; "-" is no channel. An answer that the recording contradicts is asked for again.
@@ -105,12 +105,12 @@ def write_configuration(
         write_whole(out, result.text(title).encode())
     if as_json:
         print(to_json({"file": str(out), "configuration": result.tables}))
-        return Result("configuration", str(out))
+        return NextCommand("run", out)
     if console is None:
         reasons = ((role, name, result.comments["signals", role]) for role, name in result.tables["signals"].items())
         print("".join(f"{role}: {name} ({reason})\n" for role, name, reason in reasons), end="")
     print(out)
-    return Result("configuration", str(out))
+    return NextCommand("run", out)
 
 
 def _heard(url: str, rate: float | None) -> tuple[Recorded, dict[str, Any]]:
