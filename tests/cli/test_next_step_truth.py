@@ -39,7 +39,7 @@ def test_from_a_recording_to_the_report_by_copying_the_last_line(
         assert result.code == 0, result.err
         commands.append(words[1])
         words = shlex.split(result.out.splitlines()[-1].removeprefix("Next: "))
-    assert commands == ["inspect", "inspect", "run", "fit", "report"]
+    assert commands == ["inspect", "inspect", "run", "report"]
     assert words == ["livebode", "view", "runs/Achse Z"]
 
 
@@ -95,6 +95,8 @@ def test_a_hop_beyond_the_recording_is_a_sentence_and_no_run_without_responses(t
     result = livebode("run", tmp_path / "log.csv", "--hop", "10000000", "--out", tmp_path / "run")
     assert (result.code, (tmp_path / "run").exists()) == (2, False)
     assert "less than the hop of 10000000; choose a shorter hop" in result.err
+
+
 @pytest.mark.parametrize(
     ("examples", "before", "command", "proposed"),
     [
