@@ -10,7 +10,7 @@ import typer
 from livebode.cli import terminal
 from livebode.cli.configuration_dialog import write_configuration
 from livebode.cli.live_survey import is_live, show_survey
-from livebode.cli.next_step import Result
+from livebode.cli.next_step import NextCommand
 from livebode.cli.options import Excitation, Json, Output, check_use
 from livebode.cli.recording_options import Dbc, From, Rate, SkipPeriods, Time, To
 from livebode.core import UsageError, counted
@@ -79,7 +79,7 @@ def inspect_command(
     skip_periods: SkipPeriods = None,
     dbc: Dbc = None,
     as_json: Json = False,
-) -> Result | None:
+) -> NextCommand | None:
     """List channels, rate, gaps and samples that are not finite; with --out propose and write axis.toml.
 
     With --excitation, also print period, lines and SNR. With --lines, search for mains hum in a recording without
@@ -97,7 +97,7 @@ def inspect_command(
         )  # fmt: skip
     if is_live(log):
         show_survey(log, as_json=as_json)
-        return Result("recording", log)
+        return NextCommand("inspect", log, "--out", "axis.toml")
     _check(excitation, output, input_, lines, window)
     from livebode.preparation import inspect  # with its statistics half a second to import
     from livebode.records import to_json
@@ -129,8 +129,7 @@ def inspect_command(
         console.print(f"The excitation is not recognised: {found.unrecognised}", soft_wrap=True)
     if found.estimator:
         console.print(f"estimator of a run: --estimator {found.estimator} ({_SUITS[found.estimator]})", soft_wrap=True)
-    known = {"--rate": rate, "--time": time, "--dbc": dbc}
-    return Result("recording", log, tuple(f"{word}={value}" for word, value in known.items() if value is not None))
+    return NextCommand("inspect", log, "--out", "axis.toml", rate=rate, time=time, dbc=dbc)
 
 
 def _check(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, ValidationError, model_validator
 
@@ -96,6 +96,9 @@ class ReportSection(ConfigurationSection):
         Language of the report. `--language` overrides it. Default: English.
     paper
         Size of the pages: "a4" or "letter".
+    units
+        Units of the response in pictures and tables: "si", or "drive" for those of the recording or live source.
+        Parameters and limits are in SI units.
     limits
         Acceptance limits: a list of tables with quantity, min, max and band_hz.
     """
@@ -109,6 +112,7 @@ class ReportSection(ConfigurationSection):
     logo: File | None = None
     language: Language | None = None
     paper: Paper = "a4"
+    units: Literal["si", "drive"] = "si"
     limits: Annotated[list[LimitSection], Field(max_length=LIMITS_MAX)] = []
 
     def beside(self, folder: Path) -> ReportSection:

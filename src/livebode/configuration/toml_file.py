@@ -8,7 +8,6 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from livebode.configuration.toml_mistakes import meant_lines, meant_path, mistake_at, without_thousands
 from livebode.core import ConfigError, LivebodeError
 
 FILE_BYTES_MAX = 1 << 20
@@ -86,6 +85,8 @@ def meant_line(line: str) -> str | None:
     >>> meant_line("output = “y”"), meant_line("// my axis"), meant_line('output = "y'), meant_line("[source")
     ('output = "y"', '# my axis', 'output = "y"', '[source]')
     """
+    from livebode.configuration.toml_mistakes import meant_lines  # needed for a mistake only
+
     if len(line) > _TEXT_MAX:  # nobody wrote it by hand, and the patterns take the square of its length
         return None
     return next((meant for meant in meant_lines(line) if meant != line and _is_toml(meant)), None)
@@ -118,6 +119,8 @@ def _not_utf8(data: bytes, at: int, origin: str) -> ConfigError:
 
 def _not_toml(text: str, why: str, origin: str) -> ConfigError:
     """The error of tomllib, with the line and what was probably meant."""
+    from livebode.configuration.toml_mistakes import mistake_at, without_thousands  # needed for a mistake only
+
     found = mistake_at(why, text)
     if found is not None and why.startswith(_TWICE):
         return ConfigError(
@@ -200,19 +203,26 @@ def _check_text(text: str, place: str, origin: str) -> None:
             key=place,
             limit=long,
         ).at(origin)
+    if not text.isprintable():
+        _check_escapes(text, place, origin)
+        raise ConfigError(
+            "value-invalid",
+            f"{place} = {shortened(text)} has a letter that cannot be printed",
+            "remove it",
+            key=place,
+            value=shortened(text),
+        ).at(origin)
+
+
+def _check_escapes(text: str, place: str, origin: str) -> None:
+    """ConfigError for a Windows path in double quotes, whose backslashes became control characters."""
+    from livebode.configuration.toml_mistakes import meant_path  # needed for a mistake only
+
     if (path := meant_path(text)) is not None:
         raise ConfigError(
             "value-invalid",
             f"{place} = {shortened(text)} has a backslash in double quotes, which begins a special letter",
             f"write '{path}' in single quotes, or {path.replace(chr(92), '/')}",
-            key=place,
-            value=shortened(text),
-        ).at(origin)
-    if not text.isprintable():
-        raise ConfigError(
-            "value-invalid",
-            f"{place} = {shortened(text)} has a letter that cannot be printed",
-            "remove it",
             key=place,
             value=shortened(text),
         ).at(origin)
