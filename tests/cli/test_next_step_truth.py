@@ -95,6 +95,8 @@ def test_a_hop_beyond_the_recording_is_a_sentence_and_no_run_without_responses(t
     result = livebode("run", tmp_path / "log.csv", "--hop", "10000000", "--out", tmp_path / "run")
     assert (result.code, (tmp_path / "run").exists()) == (2, False)
     assert "less than the hop of 10000000; choose a shorter hop" in result.err
+
+
 @pytest.mark.parametrize(
     ("examples", "before", "command", "proposed"),
     [

@@ -132,8 +132,12 @@ def suspicions(signals: Mapping[Role, Floats], settings: Settings, channels: Ite
     quantities = ChannelQuantities(channels)
     rules: tuple[Callable[[RoleSpectra], Suspicion | None], ...] = (
         partial(_not_repeating, signal=signals.get("excitation")),
-        partial(_answering_excitation, quantities=quantities), _noise_as_input, partial(_exchanged, quantities=quantities), _contradicting_loop, _without_answer,
-    )  # fmt: skip
+        partial(_answering_excitation, quantities=quantities),
+        _noise_as_input,
+        partial(_exchanged, quantities=quantities),
+        _contradicting_loop,
+        _without_answer,
+    )
     with np.errstate(all="ignore"):  # a signal without power at a line gives NaN, which no rule rejects
         return found + [one for rule in rules if (one := rule(spectra)) is not None]
 
