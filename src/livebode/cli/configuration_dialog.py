@@ -122,7 +122,7 @@ def _heard(url: str, rate: float | None) -> tuple[Recorded, dict[str, Any]]:
         raise SourceError(
             "no-samples",
             heard.trouble or "the channels have no samples in common",
-            "compare it with what livebode reads (docs/how-to/live.md), and correct the address or the sender",
+            "docs/how-to/live.md describes what is read; correct the address or the sender",
             address=url,
         ).at(url)
     block = heard.block if rate is None else replace(heard.block, rate_hz=rate)
