@@ -172,7 +172,9 @@ class Axis(ConfigurationSection):
 
     def beside(self, folder: Path) -> Axis:
         """The same with relative paths from `folder`."""
-        axis = self.model_copy(update={"source": self.source.beside(folder), "serve": self.serve.beside(folder)})
+        axis = self.model_copy(update={"source": self.source.beside(folder)})
+        if "serve" in self.model_fields_set:
+            axis = axis.model_copy(update={"serve": self.serve.beside(folder)})
         if self.publish:
             axis = axis.model_copy(update={"publish": [section.beside(folder) for section in self.publish]})
         if self.report is not None:

@@ -17,12 +17,12 @@ from livebode.core._loop import Loop as Loop
 from livebode.core._loop import MatrixLoop as MatrixLoop
 from livebode.core._matrix_responses import REASONS as REASONS
 from livebode.core._matrix_responses import MatrixResponses as MatrixResponses
+from livebode.core._named_samples import NamedSamples as NamedSamples
+from livebode.core._named_samples import series_of as series_of
 from livebode.core._response import PER_RESPONSE as PER_RESPONSE
 from livebode.core._response import Response as Response
 from livebode.core._response import Responses as Responses
 from livebode.core._response import widened as widened
-from livebode.core._series import Series as Series
-from livebode.core._series import series_of as series_of
 from livebode.core._spectra import LEFT_OUT as LEFT_OUT
 from livebode.core._spectra import NOT_WHOLE as NOT_WHOLE
 from livebode.core._spectra import SPIKE as SPIKE

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 
 from livebode.core import Responses
 from livebode.records import RunRecord
+from livebode_start.workspace import Workspace
 from tests.support.browser import Tab, chromium
 from tests.support.command import livebode
 from tests.support.start_pages import CHANNELS, drop, start_page
@@ -114,6 +116,45 @@ def test_a_german_csv_is_measured_on_a_phone(tmp_path: Path) -> None:
         tab.page.wait_for_url("**/run/**")
         assert tab.wrong == []
     check_truth(folder / "Prüfstand 3")
+
+
+def test_a_recording_beside_the_directory_is_chosen_and_the_terminal_repeats_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    write_servo(tmp_path / "servo.csv")
+    for number in range(8):
+        write_servo(tmp_path / f"short {number}.csv", Servo(periods=1))
+        os.utime(tmp_path / f"short {number}.csv", (2e9, 2e9))
+    (tmp_path / "notes.toml").write_text("")
+    (tmp_path / "link.csv").symlink_to("servo.csv")
+    with start_page(Path("runs")) as url, chromium() as browser, Tab(browser, url, wait=False) as tab:
+        tab.page.wait_for_selector(".recordings a")
+        assert not tab.page.is_visible("text=../servo.csv")
+        tab.page.click(".here button")
+        names = tab.page.locator(".recordings a").all_inner_texts()
+        assert sorted(names) == [f"../{name}" for name in ("servo.csv", *(f"short {k}.csv" for k in range(8)))]
+        tab.page.click("text=../servo.csv")
+        tab.page.wait_for_selector("#measure:enabled")
+        tab.page.click("#measure")
+        tab.page.wait_for_url("**/run/servo/")
+        assert tab.wrong == []
+    check_truth(Path("runs/servo"))
+    monkeypatch.chdir(tmp_path / "runs")
+    assert livebode("run", "servo.toml", "--out", "terminal").code == 0
+    np.testing.assert_array_equal(newest(Path("terminal")).value, newest(Path("servo")).value)
+
+
+@pytest.mark.parametrize("elsewhere", ["home/runs", "link"])
+def test_only_beside_a_directory_in_the_working_one_recordings_are_offered(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, elsewhere: str
+) -> None:
+    write_servo(tmp_path / "servo.csv")
+    (tmp_path / "home" / "runs").mkdir(parents=True)
+    (tmp_path / "link").symlink_to("home/runs")
+    monkeypatch.chdir(tmp_path)
+    assert Workspace(Path(elsewhere)).recordings() == []
+    assert [row["name"] for row in Workspace(Path("runs")).recordings()] == ["../servo.csv"]
 
 
 def test_a_measurement_is_cancelled_and_nothing_is_half_written(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import OrderedDict
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -15,12 +16,14 @@ from livebode.language import Message, for_page
 from livebode.plugins import named
 from livebode.preparation import Guess, Proposals, Settled, chosen_part, settled, suitable_estimator, tables_of
 from livebode.sources import Log, open_log
+from livebode.sources.live import Survey
+from livebode_start.listening import log_of_heard, shown
 from livebode_start.preview import Overview
 
 OPEN_MAX = 4
 """Recordings in memory."""
 _CHANNELS_MAX = 500
-_NAME_MAX = 500
+_NAME_MAX = 2000
 _ESTIMATORS = "joint", "direct", "lpm", "welch"
 Role = Literal["excitation", "input", "output", "schedule"]
 
@@ -39,7 +42,7 @@ class Choices(BaseModel):
     Attributes
     ----------
     recording
-        Name of the file.
+        Name of the file, or the address that was listened to.
     rate_hz
         Samples per second, of a recording without a rate.
     signals
@@ -82,21 +85,24 @@ class Choices(BaseModel):
 
 @dataclass
 class OpenedRecording:
-    """A recording of the workspace in memory.
+    """A recording of the workspace, or what came from an address, in memory.
 
     Attributes
     ----------
     name
-        Of its file.
-    rate_hz
-        As given, for one without a rate; else None.
+        Of its file as the workspace offers it, or the address.
+    source
+        Its section [source].
     log
         What reads it.
+    heard
+        What the page shows of each channel of a live source; None of a file.
     """
 
     name: str
-    rate_hz: float | None
+    source: Mapping[str, Any]
     log: Log
+    heard: Mapping[str, Any] | None = None
 
     @cached_property
     def proposals(self) -> Proposals:
@@ -123,10 +129,11 @@ class OpenedRecording:
             "recording": self.name,
             "format": log.format,
             "rate_hz": log.rate_hz,
-            "rate_given": self.rate_hz is not None,
+            "rate_given": "rate_hz" in self.source,
             "begin_s": log.origin_s,
             "end_s": log.origin_s + self.stop / log.rate_hz,
             "gaps": 0 if timing is None else timing.gaps,
+            **(self.heard or {}),
             "channels": [
                 {
                     "name": channel.name,
@@ -185,12 +192,30 @@ class OpenedRecordings:
     def __init__(self) -> None:
         self._opened: OrderedDict[Any, OpenedRecording] = OrderedDict()
 
-    def open(self, path: Path, rate_hz: float | None) -> OpenedRecording:
-        """The recording of a file, read again if the file has changed; LivebodeError if it cannot be read."""
+    def open(self, path: Path, name: str, rate_hz: float | None) -> OpenedRecording:
+        """The recording of a file, read again if the file has changed; LivebodeError if it cannot be read.
+
+        `name` is its path relative to the configuration.
+        """
         status = path.stat()
-        key = path.name, status.st_mtime_ns, status.st_size, rate_hz
+        source: dict[str, Any] = {"log": name} | ({} if rate_hz is None else {"rate_hz": rate_hz})
+        return self._retained(
+            (name, status.st_mtime_ns, status.st_size, rate_hz),
+            lambda: OpenedRecording(name, source, open_log(path, rate_hz=rate_hz)),
+        )
+
+    def of_heard(self, heard: Survey, rate_hz: float | None) -> OpenedRecording:
+        """The samples of a live source as a recording."""
+
+        def opened() -> OpenedRecording:
+            log, source = log_of_heard(heard, rate_hz)
+            return OpenedRecording(str(heard.source["url"]), source, log, shown(heard))
+
+        return self._retained((heard, rate_hz), opened)
+
+    def _retained(self, key: object, opened: Callable[[], OpenedRecording]) -> OpenedRecording:
         if key not in self._opened:
-            self._opened[key] = OpenedRecording(path.name, rate_hz, open_log(path, rate_hz=rate_hz))
+            self._opened[key] = opened()
             while len(self._opened) > OPEN_MAX:
                 self._opened.popitem(last=False)
         self._opened.move_to_end(key)
@@ -212,9 +237,7 @@ def proposed(opened: OpenedRecording, choices: Choices) -> ProposedConfiguration
     estimator = choices.estimator or estimator
     average = "schedule" not in signals and not choices.baseline if choices.average is None else choices.average
     model = choices.model or "none"
-    source = {
-        "log": opened.name, "rate_hz": choices.rate_hz, "from": choices.begin_s, "to": choices.end_s
-    }  # fmt: skip
+    source = {**opened.source, "from": choices.begin_s, "to": choices.end_s}
     tables = tables_of(source, signals, estimator=estimator, average=average, model=model)
     if choices.baseline:
         tables["monitoring"] = {"baseline": f"baselines/{choices.baseline}.json"}

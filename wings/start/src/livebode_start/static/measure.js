@@ -3,6 +3,7 @@
 import { followJob } from "./job_progress.js";
 import { tr, trn } from "./language.js";
 import { post, reason } from "./link.js";
+import { heardTable, listen } from "./live_source.js";
 import { byId as $, element } from "./make.js";
 import { Roles } from "./measure_roles.js";
 import { Signals } from "./measure_signals.js";
@@ -28,6 +29,8 @@ import { plain } from "./words.js";
  * @property {Record<Role, Guess>} roles
  * @property {string[]} estimators
  * @property {string[]} models
+ * @property {import("./live_source.js").Heard[]} [heard] of a live source
+ * @property {boolean} [rate_measured] by the arrival of what another program sends
  */
 /**
  * @typedef {object} Configuration
@@ -43,8 +46,11 @@ import { plain } from "./words.js";
  * @property {string} command
  */
 
-const SETTLE_MS = 250;
-const recording = new URLSearchParams(location.search).get("recording") ?? "";
+const SETTLE_MS = 250,
+  LOOK_MS = 500;
+const query = new URLSearchParams(location.search),
+  recording = query.get("recording") ?? "",
+  rateGiven = Number(query.get("rate_hz")) || null;
 const frequencies = $("frequencies", HTMLInputElement),
   window_ = $("window", HTMLInputElement),
   estimator = $("estimator", HTMLSelectElement),
@@ -71,11 +77,11 @@ async function open(rateHz) {
   try {
     show(await json("/api/recording", { recording, ...(rateHz === null ? {} : { rate_hz: String(rateHz) }) }));
     complain(null);
-    $("rate").hidden = true;
   } catch (error) {
     $("facts").textContent = "";
     complain(error);
     $("rate").hidden = !(error instanceof Error && /rate/i.test(error.message));
+    $("again").hidden = !recording.includes("://");
   }
 }
 
@@ -89,6 +95,7 @@ function show(facts) {
     ];
   $("facts").textContent = words.join(" · ");
   $("steps").hidden = $("next").hidden = false;
+  if (facts.heard) showHeard(facts, facts.heard);
   const signals = new Signals($("signals"), $("more", HTMLButtonElement), facts, complain);
   const roles = new Roles($("slots"), facts.channels, facts.roles, () => {
     signals.mark(roles.chosen);
@@ -140,8 +147,10 @@ function show(facts) {
     try {
       const { job, run } = await post("/api/measure", choices());
       $("ready").hidden = measure.hidden = true;
-      const ended = await followJob($("job"), job, tr("Measuring …"));
-      if (ended.state === "done") {
+      // A live measurement lasts until somebody finishes it, on the page of its run.
+      const ends = [followJob($("job"), job, tr("Measuring …")), ...(facts.heard ? [recorded(run)] : [])];
+      const ended = await Promise.race(ends);
+      if (ended === null || ended.state === "done") {
         location.assign(`/run/${encodeURIComponent(run)}/`);
         return;
       }
@@ -168,7 +177,7 @@ function show(facts) {
   }
 
   signals.onZoom = () => {
-    $("use").hidden = signals.whole;
+    $("use").hidden = signals.whole || facts.heard !== undefined;
   };
   $("use").addEventListener("click", () => {
     [from.value, to.value] = signals.span.map((s) => String(Math.round(s * facts.rate_hz) / facts.rate_hz));
@@ -190,6 +199,35 @@ function show(facts) {
   signals.mark(roles.chosen);
   signals.fetch();
   propose();
+}
+
+/**
+ * What came from a live source, whose rate can be corrected; a measurement of it has no span.
+ *
+ * @param {Facts} facts
+ * @param {import("./live_source.js").Heard[]} heard
+ */
+function showHeard(facts, heard) {
+  $("heard").hidden = $("again").hidden = false;
+  $("rate").hidden = !facts.rate_measured;
+  $("channels").replaceChildren(heardTable(heard));
+  $("rate-hz", HTMLInputElement).value = String(facts.rate_hz);
+  $("rate-set").textContent = tr("Set");
+  $("span").hidden = true;
+}
+
+/**
+ * Until a live source is recorded: its run is in the list.
+ *
+ * @param {string} run
+ */
+async function recorded(run) {
+  for (;;) {
+    /** @type {import("./runs_feed.js").Answer} */
+    const { runs } = await json("/api/runs", { since: 0 });
+    if (runs.some(({ name }) => name === run)) return null;
+    await new Promise((done) => setTimeout(done, LOOK_MS));
+  }
 }
 
 /** @param {HTMLInputElement} field */
@@ -234,6 +272,20 @@ $("copy").addEventListener("click", async () => {
 });
 $("rate").addEventListener("submit", (event) => {
   event.preventDefault();
-  open(Number($("rate-hz", HTMLInputElement).value));
+  location.search = new URLSearchParams({ recording, rate_hz: $("rate-hz", HTMLInputElement).value }).toString();
 });
-open(null);
+$("again").addEventListener("click", async () => {
+  const button = $("again", HTMLButtonElement);
+  button.disabled = true;
+  $("facts").textContent = tr("listening for 3 s …");
+  try {
+    const { usable, trouble } = await listen(recording);
+    if (!usable) throw new Error(worded(trouble));
+    location.reload();
+  } catch (error) {
+    complain(error);
+    $("facts").textContent = "";
+    button.disabled = false;
+  }
+});
+open(rateGiven);
