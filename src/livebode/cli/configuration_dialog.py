@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from livebode.cli import terminal
 from livebode.cli.live_survey import is_live
-from livebode.cli.next_step import Result
+from livebode.cli.next_step import NextCommand
 from livebode.cli.shell import command_line
 from livebode.core import (
     LivebodeError,
@@ -64,7 +64,7 @@ def write_configuration(
     yes: bool,
     force: bool,
     as_json: bool,
-) -> Result:
+) -> NextCommand:
     """Write the configuration of a recording: list its channels, propose their roles, ask, and find lines and window.
 
     What is given is not asked for; "-" is no channel. An answer that the recording contradicts is asked for again.
@@ -105,12 +105,12 @@ def write_configuration(
         write_whole(out, result.text(title).encode())
     if as_json:
         print(to_json({"file": str(out), "configuration": result.tables}))
-        return Result("configuration", str(out))
+        return NextCommand("run", out)
     if console is None:
         reasons = ((role, name, result.comments["signals", role]) for role, name in result.tables["signals"].items())
         print("".join(f"{role}: {name} ({reason})\n" for role, name, reason in reasons), end="")
     print(out)
-    return Result("configuration", str(out))
+    return NextCommand("run", out)
 
 
 def _heard(url: str, rate: float | None) -> tuple[Recorded, dict[str, Any]]:
@@ -122,7 +122,7 @@ def _heard(url: str, rate: float | None) -> tuple[Recorded, dict[str, Any]]:
         raise SourceError(
             "no-samples",
             heard.trouble or "the channels have no samples in common",
-            f"see what arrives: {command_line('livebode', 'inspect', url)}",
+            "compare it with what livebode reads (docs/how-to/live.md), and correct the address or the sender",
             address=url,
         ).at(url)
     block = heard.block if rate is None else replace(heard.block, rate_hz=rate)
@@ -241,7 +241,7 @@ class Dialog:
 
     def _tables(self, source: Mapping[str, Any], signals: dict[str, str]) -> dict[str, dict[str, Any]]:
         from livebode.plugins import named
-        from livebode.preparation import suitable_estimator, tables_of
+        from livebode.preparation import suitable_estimator, suitable_model, tables_of
 
         answers, console = self._answers, self._console
         if "estimator" not in answers:
@@ -251,7 +251,8 @@ class Dialog:
             still = "schedule" not in signals
             answers["average"] = _agrees(console, "Average over all periods, for a standstill", still)
         if "fit" not in answers:
-            answers["fit"] = _ask(console, "Model to fit to the responses", "none", ("none", "auto", *named("models")))
+            suits = suitable_model(self._proposals.log, signals)
+            answers["fit"] = _ask(console, "Model to fit to the responses", suits, ("none", "auto", *named("models")))
         estimator, average, model = (answers[key] for key in ("estimator", "average", "fit"))
         return tables_of(source, signals, estimator=estimator, average=average, model=model)
 
@@ -320,11 +321,12 @@ def _check_signals(signals: Mapping[str, str], names: Sequence[str], path: str) 
             argument="output",
         )
     alone = command_line("livebode", "run", path, "--output-only", "--output", signals["output"])
+    modes = f"the modes are found by {alone}"
     if not {"excitation", "input"} & set(signals):
         raise UsageError(
             "missing",
             f"neither an excitation nor an input is recognised among {', '.join(names)}",
-            f"give --excitation and --input; of an output alone the modes are found by {alone}",
+            "give --excitation and --input" + ("" if is_live(path) else f"; of an output alone {modes}"),
             options=["--excitation", "--input"],
         )
     if "input" not in signals:

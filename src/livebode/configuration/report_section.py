@@ -11,6 +11,7 @@ from pydantic import AfterValidator, Field, ValidationError, model_validator
 
 from livebode.configuration.section import ConfigurationSection, File, Language
 from livebode.configuration.toml_file import one_line, read_table, shortened
+from livebode.configuration.toml_mistakes import meant_value
 from livebode.core import ConfigError, Paper, nearest_name
 
 LIMITS_MAX = 50
@@ -156,4 +157,6 @@ def report_error(first: Mapping[str, Any]) -> ConfigError:
         return ConfigError("value-invalid", f"{place}: {why}", "correct it", key=place)
     if "Quantities: " in why:
         return ConfigError("value-invalid", f"{place} = {value} is not a quantity", why, key=place, value=value)
-    return ConfigError("value-invalid", f"{place} = {value} is not usable: {why}", "correct it", key=place, value=value)
+    meant = meant_value(first["type"], first["input"])
+    remedy = "correct it" if meant is None else f"write {meant}"
+    return ConfigError("value-invalid", f"{place} = {value} is not usable: {why}", remedy, key=place, value=value)
