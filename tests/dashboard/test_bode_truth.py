@@ -185,8 +185,8 @@ def test_a_bound_of_any_size_is_shown_with_two_digits_and_never_as_zero(tab: Tab
     decibels, absolute, degrees, none = tab.page.evaluate(
         """async (half) => {
           const { angle, bounds, halfAngle } = await import("/static/values.js");
-          const around = (absolute) => bounds(20 - half, 20, 20 + half, { absolute });
-          return [around(false), around(true), halfAngle(half), angle(-1e-6)];
+          const both = [false, true].map((absolute) => bounds(20 - half, 20, 20 + half, { absolute }));
+          return [...both, halfAngle(half), angle(-1e-6)];
         }""",
         half,
     )

@@ -41,6 +41,8 @@ def with_bound(value: float, bound: float) -> tuple[str, str]:
     (('501200', '1200'), ('0.002800', '0.000012'), ('3', 'not known'))
     >>> with_bound(-1e-9, 2e-4), with_bound(2e-14, 1.6e-7)
     (('0.00000', '0.00020'), ('0', '1.6e-07'))
+    >>> with_bound(-4.16, 250.0)
+    ('0', '250')
     """
     if not isfinite(value):
         return "—", "—"

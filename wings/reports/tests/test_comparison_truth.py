@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,6 +13,7 @@ import pytest
 from livebode.core import PER_LINE, Block, Lines, Responses
 from livebode.estimation import Settings, Tracker
 from livebode.fitting import mean_response
+from livebode.interface import write_examples
 from livebode.records import RunRecord
 from livebode_reports.difference import ALPHA, Difference, compare
 from tests.support import command
@@ -182,3 +184,18 @@ def test_no_table_of_precise_parameters_is_wider_than_its_page(tmp_path: Path, m
     assert any("motor inertia" in row and "e-0" in row for row in rows), rows
     assert not [text for more, text in wide if more > 0]
     assert not any("-0.0" in row or "−0.0" in row or "0.00000000" in row for row in rows), rows
+
+
+def test_of_equal_runs_each_amount_is_zero_and_no_number_below_a_million_has_an_exponent(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    write_examples(["standstill"], tmp_path)
+    assert livebode("run", "standstill.toml").code == 0
+    shutil.copytree("runs/standstill", "runs/again")
+    shown = livebode("compare", "runs/standstill", "runs/again").out
+    rows = [row for row in shown.splitlines() if " → " in row]
+    assert len(rows) >= 8
+    for row in rows:
+        assert " 0 ± " in row
+    assert "e+0" not in shown

@@ -259,7 +259,16 @@ def _found(opened: OpenedRecording, choices: Choices) -> ProposedConfiguration:
     if choices.lines is not None:
         tables["lines"] = choices.lines.model_dump()
     reasons = {role: _reason(opened, role, name) for role, name in signals.items()}
-    return ProposedConfiguration(settled(log, tables, reasons), estimator, reason, average, model)
+    result = settled(log, tables, reasons)
+    if opened.heard is not None and "lines" not in result.tables:
+        raise UsageError(
+            "missing",
+            Message("nothing repeats in {reference}, and a live source needs lines and a window",
+                    reference=signals.get("excitation") or signals["input"]),
+            Message("enter both"),
+            argument="lines",
+        )  # fmt: skip
+    return ProposedConfiguration(result, estimator, reason, average, model)
 
 
 def _reason(opened: OpenedRecording, role: str, name: str) -> str:
