@@ -40,6 +40,7 @@ export class Lost {
   draw() {
     document.body.classList.toggle("stale", this.since !== null && this.what !== "over");
     this.host.hidden = this.since === null;
+    this.host.classList.toggle("over", this.what === "over");
     if (!this.since) return;
     const time = clockTime(this.since);
     const words = {
