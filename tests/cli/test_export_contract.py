@@ -91,7 +91,9 @@ def test_parameters_of_a_run_are_exported_and_a_run_without_fits_is_refused(run:
     for to in ("csv", "mat"):
         done = livebode("export", fitted, "--to", to, "--parameters")
         assert (done.code, done.err) == (0, "")
-        assert done.out == f"{tmp_path / 'fitted-parameters'}.{to}: 4 parameter values\n"
+        assert (
+            done.out == f"{tmp_path / 'fitted-parameters'}.{to}: 4 parameter values\nNext: livebode report {fitted}\n"
+        )
     frame = read_exactly(tmp_path / "fitted-parameters.csv")
     pd.testing.assert_frame_equal(frame, pd.DataFrame(PARAMETERS), check_dtype=False)
     struct = scipy.io.loadmat(tmp_path / "fitted-parameters.mat", simplify_cells=True)["livebode"]

@@ -97,6 +97,7 @@ MISTAKES = [
     ("fit runs/mondy", "did you mean 'monday'?"),
     ("fit log.csv", "'log.csv' is a file, not the directory of a run"),
     ("view nowhere/run", "there is no directory 'nowhere/run'"),
+    ("view runs/mondy", "did you mean 'monday'?"),
     ("report directory", "has no run.json"),
     ("compare runs/monday runs/nope", "there is no directory 'runs/nope'"),
     ("learn runs/nope --out healthy.json", "there is no directory"),

@@ -8,6 +8,7 @@ from livebode.cli.learned_baseline import baseline_text as baseline_text
 from livebode.cli.learned_baseline import check_replaceable as check_replaceable
 from livebode.cli.learned_baseline import write_baseline as write_baseline
 from livebode.cli.log_output import warnings_shown as warnings_shown
+from livebode.cli.next_step import NextCommand as NextCommand
 from livebode.cli.options import Entry as Entry
 from livebode.cli.options import Excitation as Excitation
 from livebode.cli.options import Json as Json

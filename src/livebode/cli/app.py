@@ -22,7 +22,7 @@ from typer.core import TyperCommand, TyperGroup
 from livebode.cli.commands import ABOUT, OPTIONS, Command
 from livebode.cli.failures import disk_full, failure_of, json_requested, name_options, unparsed
 from livebode.cli.log_options import File, Level, LogOptions, logged
-from livebode.cli.next_step import Result, next_line
+from livebode.cli.next_step import NextCommand
 from livebode.cli.remote import with_copies
 from livebode.cli.terminal import print_page, protect
 from livebode.core import DamageWarning, LivebodeError, needing
@@ -101,8 +101,8 @@ class _Command(_Light, TyperCommand):
         except LivebodeError as error:
             name_options(error, self.params)
             raise
-        if isinstance(result, Result) and not json_requested() and (line := next_line(result)) is not None:
-            print(line)
+        if isinstance(result, NextCommand) and not json_requested() and result.line is not None:
+            print(result.line)
 
 
 class _Commands(Mapping[str, TyperCommand]):

@@ -7,6 +7,7 @@ import sys
 from collections.abc import Mapping
 from typing import Any
 
+from rich.console import Group
 from rich.live import Live
 from rich.table import Table
 from rich.text import Text
@@ -18,7 +19,6 @@ from livebode.core import Event, LivebodeError
 from livebode.runtime import AxisThread, Session, StoppedError, Subscriber
 
 _COLUMNS = ("axis", "state", "rate", "samples", "responses", "lost", "latency", "behind", "last event")
-_EVENT_LETTERS = 60
 _LOOKS_A_REDRAW = 5
 
 
@@ -74,22 +74,36 @@ class AxesTerminal:
                 self._print(f"livebode: {thread.name}: {state}{_at(thread)}")
         self._looks += 1
         if table and self._looks % _LOOKS_A_REDRAW == 0:
-            self._live.update(table_of(session.all), refresh=True)
+            self._live.update(table_of(session.all, self._console.width), refresh=True)
 
     def _print(self, line: str) -> None:
         self._console.print(line, markup=False, soft_wrap=True)
 
 
-def table_of(threads: list[AxisThread]) -> Table:
-    """One line for each axis."""
+def table_of(threads: list[AxisThread], width: int) -> Group:
+    """One line for each axis; below them the events that are too long for it, in whole words.
+
+    Parameters
+    ----------
+    threads
+        The axes.
+    width
+        Columns of the terminal.
+    """
     table = Table(box=None, pad_edge=False)
     for column in _COLUMNS:
         table.add_column(column, justify="right" if column in _COLUMNS[2:8] else "left", no_wrap=True)
-    for thread in threads:
-        table.add_row(*map(Text, _row(thread)))
+    rows = {thread: _row(thread) for thread in threads}
+    columns = [max(map(len, column)) for column in zip(_COLUMNS, *rows.values())]
+    events = {thread: "" if thread.status.event is None else thread.status.event.message for thread in threads}
+    room = max(width - sum(columns) - len(columns), len(_COLUMNS[-1]))  # a space between two columns
+    below = {thread for thread, event in events.items() if len(event) > room}
+    for thread, row in rows.items():
+        table.add_row(*map(Text, row), Text("see below" if thread in below else events[thread]))
     # In a narrow terminal everything else may be shortened.
-    table.columns[0].min_width = max((len(thread.name) for thread in threads), default=0)
-    return table
+    table.columns[0].min_width = columns[0]
+    lines = (Text(f"{rows[thread][0]}: {events[thread]}") for thread in threads if thread in below)
+    return Group(table, *lines)
 
 
 def cause_of(error: Exception | None) -> str:
@@ -102,7 +116,6 @@ def cause_of(error: Exception | None) -> str:
 def _row(thread: AxisThread) -> tuple[str, ...]:
     status = thread.status
     health = status.health
-    event = "" if status.event is None else status.event.message
     return (
         thread.name or "axis",
         status.state,
@@ -112,7 +125,6 @@ def _row(thread: AxisThread) -> tuple[str, ...]:
         "" if health is None else str(health.lost),
         "" if status.latency_s is None else f"{1e3 * status.latency_s:.1f} ms",
         "" if health is None else f"{health.waiting_s:.1f} s",
-        event if len(event) <= _EVENT_LETTERS else event[:_EVENT_LETTERS] + "…",
     )
 
 

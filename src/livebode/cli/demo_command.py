@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from livebode.cli import terminal
-from livebode.cli.next_step import Result
+from livebode.cli.next_step import NextCommand
 from livebode.cli.options import Json, Port, Serve
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ def demo_command(
     serve: Serve = False,
     port: Port = None,
     as_json: Json = False,
-) -> Result:
+) -> NextCommand:
     """Track a simulated belt axis during its strokes, live; halfway, the belt loses 10 % of its stiffness."""
     from rich.progress import BarColumn, Progress, TextColumn
 
@@ -84,7 +84,7 @@ def demo_command(
         else:
             show(outcome)
             sys.stdout.flush()
-    return Result("run", str(out))
+    return NextCommand("view", out)
 
 
 def _numbers(responses: Responses) -> str:

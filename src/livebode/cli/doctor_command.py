@@ -9,7 +9,7 @@ import typer
 
 from livebode.cli import terminal
 from livebode.cli.file_schema import print_schema
-from livebode.cli.next_step import Result
+from livebode.cli.next_step import NextCommand
 from livebode.cli.options import Json, check_use
 from livebode.cli.receivers import show_receivers
 from livebode.core import UsageError
@@ -52,7 +52,7 @@ def doctor_command(
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace an earlier bundle or schema.")] = False,
     as_json: Json = False,
-) -> Result | None:
+) -> NextCommand | None:
     """Check this computer, a configuration and whether its machine can be reached; its receivers, its schema.
 
     Exit code 2 where a check or a test message failed. No data is changed; a live source is listened to for 3 s. The
@@ -81,7 +81,7 @@ def _check_targets(targets: list[Path], option: str, most: int) -> None:
         )  # fmt: skip
 
 
-def _check(targets: list[Path], bundle: Path | None, runs: Path, *, force: bool, as_json: bool) -> Result | None:
+def _check(targets: list[Path], bundle: Path | None, runs: Path, *, force: bool, as_json: bool) -> NextCommand | None:
     from livebode.doctor import Subject, examine, worst, write_bundle  # with the dashboard and the simulation
     from livebode.records import to_json
 
@@ -99,7 +99,7 @@ def _check(targets: list[Path], bundle: Path | None, runs: Path, *, force: bool,
     if verdict == "failed":
         raise typer.Exit(2)
     runs_next = subject.configuration is not None and subject.sourced and subject.run_path is None
-    return Result("configuration", str(subject.configuration)) if runs_next else None
+    return NextCommand("run", subject.configuration) if runs_next else None
 
 
 def _show(checks: list[Check]) -> None:

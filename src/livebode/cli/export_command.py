@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from livebode.cli.next_step import NextCommand
 from livebode.cli.options import Entry, Json
 from livebode.cli.query_result import Csv, RowsMax, check_query, print_result
 from livebode.cli.remote import beside
@@ -59,7 +60,7 @@ def export_command(
     as_csv: Csv = False,
     force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
     as_json: Json = False,
-) -> None:
+) -> NextCommand | None:
     """Write the responses, the fitted parameters or the model in a format of other programs, or query with SQL.
 
     Of a matrix run all entries are written, or one of them with --entry, as of an ordinary run. A query may be of a run
@@ -69,7 +70,7 @@ def export_command(
     check_query(context, as_csv=as_csv, as_json=as_json)
     if sql is not None:
         _print_rows(run, sql, rows, as_csv=as_csv, as_json=as_json)
-        return
+        return None
     if to is None:
         raise UsageError(
             "missing",
@@ -92,14 +93,14 @@ def export_command(
         written = export.save(path, lambda path: loaded(formats[to])(path, table), force=force)
         found = {"file": str(path), "rows": written.rows}
         print(to_json(found) if as_json else f"{path}: {written.rows} parameter values")
-        return
+        return NextCommand("report", run)
     if lpv:
         from livebode.analysis import lpv_model
 
         model = lpv_model(run)
         written = export.save(path, lambda path: loaded(formats[to])(path, model), force=force)
         print(to_json({"file": str(path), "rows": written.rows}) if as_json else f"{path}: {written.rows} places")
-        return
+        return NextCommand("report", run)
     export_rule = rule(kind_of(record.summary), "export")
     parts = export_rule(record, at, mean)
     formats = export.writers(export_rule.__name__)
@@ -107,9 +108,10 @@ def export_command(
     written = export.save(path, lambda path: loaded(formats[to])(path, parts, record.summary), force=force)
     if as_json:
         print(to_json({"file": str(path), "rows": written.rows, "left_out": written.left_out}))
-        return
+        return None
     left_out = f"; {written.left_out} with fewer than two valid lines left out" if written.left_out else ""
     print(f"{path}: {counted(written.rows)} at {counted(len(record.lines), 'line')}{left_out}")
+    return NextCommand("report", run, entry=entry)
 
 
 def _print_rows(run: Path, sql: str, rows_max: int, *, as_csv: bool, as_json: bool) -> None:

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
-from livebode.cli.next_step import Result
+from livebode.cli.next_step import NextCommand
 from livebode.cli.options import Json, parsed_band
 from livebode.cli.section_options import with_keys
 from livebode.core import UsageError
 from livebode.estimates import kind_of, rule
-from livebode.locations import location, original
+from livebode.locations import location
 
 if TYPE_CHECKING:
     from livebode.configuration import FitSection
@@ -68,7 +68,7 @@ def fit_command(
         ),
     ] = None,
     as_json: Json = False,
-) -> Result | None:
+) -> NextCommand | None:
     """Fit a model to the response of a run, and print its parameters with bounds.
 
     With modal or rational the outputs of several runs have their poles in common, and so do all entries of a matrix run
@@ -93,13 +93,13 @@ def fit_command(
         section = _section(run.path, {name: specified[name] for name in specified if name != "model"})
         found, remarks = fit(run, kind, section, order)
         _show_poles(found, remarks, as_json)
-        return Result("fitted run", original(str(directories[0])))
+        return NextCommand("report", directories[0])
     runs = _opened(directories, entry or [])
     if model in POLE_MODELS:
         _fit_poles(runs, cast(Kind, model), specified, order, as_json)
     else:
         _fit_physical(runs, specified, order, as_json)
-    return Result("fitted run", original(str(directories[0]))) if len(directories) == 1 else None
+    return NextCommand("report", directories[0]) if len(directories) == 1 else None
 
 
 def _fit_rule(directories: list[Path]) -> Any:

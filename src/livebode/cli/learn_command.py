@@ -8,6 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from livebode.cli import terminal
+from livebode.cli.next_step import NextCommand
 from livebode.cli.options import Json
 from livebode.core import UsageError, counted
 from livebode.locations import location
@@ -32,7 +33,7 @@ def learn_command(
         Path | None, typer.Option(metavar="BASELINE", help="List the versions of a baseline, and learn nothing.")
     ] = None,
     as_json: Json = False,
-) -> None:
+) -> NextCommand | None:
     """Learn a baseline from runs of the healthy machine, for `livebode run --baseline`."""
     from livebode.cli.learned_baseline import baseline_text, check_replaceable, write_baseline
     from livebode.records import to_json
@@ -40,7 +41,7 @@ def learn_command(
     if history is not None:
         _check_alone(runs, out)
         print(_history(history, as_json=as_json))
-        return
+        return None
     if out is None:
         raise UsageError("missing", "the file of the baseline is not named", "give --out BASELINE", argument="out")
     from livebode.analysis import learn  # with the simulation
@@ -52,6 +53,13 @@ def learn_command(
     found = write_baseline(learned, out, reason, force=force)
     file = found.pop("file")
     print(to_json(found) if as_json else f"{baseline_text(found)}\n{file}")
+    return _next(out, runs or [])
+
+
+def _next(baseline: Path, runs: list[Path]) -> NextCommand:
+    """The newest run again, compared with the baseline, where its configuration is beside; else the versions."""
+    axis = Path(f"{runs[-1].name}.toml")
+    return NextCommand("run", axis, baseline=baseline) if axis.is_file() else NextCommand("learn", history=baseline)
 
 
 def _check_alone(runs: list[Path] | None, out: Path | None) -> None:

@@ -1,46 +1,43 @@
-"""The last line of a command: what a person would want next."""
+"""The last line of a command: the command that a person would want next."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+import sys
 
 from livebode.cli.shell import command_line
-
-NEXT: Mapping[str, tuple[str, ...]] = {
-    "recording": ("inspect", "{place}", "--out", "axis.toml"),
-    "configuration": ("run", "{place}"),
-    "responses": ("fit", "{place}"),
-    "fitted run": ("report", "{place}"),
-    "run": ("view", "{place}"),
-    "runs": ("view", "{place}"),
-}
-"""By what a command leaves: the words of the command that follows, with its place."""
+from livebode.locations import original
 
 
-@dataclass(frozen=True)
-class Result:
-    """What a command leaves, and where.
+class NextCommand:
+    """What a command returns, so that its last line is the command that a person would want next, to be copied.
 
-    Attributes
+    It is printed unless the command was called with --json, or the wing of the next one is not installed.
+
+    Parameters
     ----------
-    kind
-        A key of `NEXT`.
-    place
-        Its path or URL.
+    words
+        Name, arguments and flags. A local copy of a URL is printed as the URL.
+    options
+        Options by the name of their parameter; one that is None is left out.
+
+    >>> NextCommand("report", "runs/my axis", entry="velocity/u", on=None).line
+    "Next: livebode report 'runs/my axis' --entry velocity/u"
     """
 
-    kind: str
-    place: str
+    def __init__(self, *words: object, **options: object) -> None:
+        given = {name: value for name, value in options.items() if value is not None}
+        named = [word for name, value in given.items() for word in (f"--{name.replace('_', '-')}", value)]
+        self._words = [original(str(word)) for word in (*words, *named)]
 
+    @classmethod
+    def again(cls, **options: object) -> NextCommand:
+        """The command that runs now, with these options added."""
+        return cls(*sys.argv[1:], **options)
 
-def next_line(result: Result) -> str | None:
-    """The line with the command that follows, to be copied; None where its wing is not installed.
+    @property
+    def line(self) -> str | None:
+        """The line; None if the command is not installed."""
+        from livebode.plugins import named
 
-    >>> next_line(Result("responses", "runs/my axis"))
-    "Next: livebode fit 'runs/my axis'"
-    """
-    from livebode.plugins import named
-
-    words = [word.format(place=result.place) if word == "{place}" else word for word in NEXT[result.kind]]
-    return f"Next: {command_line('livebode', *words)}" if words[0] in named("commands") else None
+        is_known = self._words[0] in named("commands")
+        return f"Next: {command_line('livebode', *self._words)}" if is_known else None

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 import typer
 
-from livebode.cli.next_step import Result
+from livebode.cli.next_step import NextCommand
 from livebode.cli.options import Band, Json, Port, Serve
 from livebode.cli.section_options import with_keys
 from livebode.core import UsageError
@@ -88,7 +88,7 @@ def run_command(
     serve: Serve = False,
     port: Port = None,
     as_json: Json = False,
-) -> Result:
+) -> NextCommand:
     """Track the frequency response of a machine in a recording, or live until the source ends or Ctrl-C.
 
     Writes a run directory with responses.parquet, run.json, events.jsonl, bode.png and tracking.png; with several

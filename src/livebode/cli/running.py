@@ -20,7 +20,7 @@ import typer
 
 from livebode.cli import terminal
 from livebode.cli.failures import exit_code_of
-from livebode.cli.next_step import Result
+from livebode.cli.next_step import NextCommand
 from livebode.cli.notices import NoticePrinter, PercentPrinter
 from livebode.cli.options import parsed_band
 from livebode.cli.pictures import draw, load_beside, tell_how_to_draw, tracked_amount
@@ -62,7 +62,7 @@ def run_targets(
     serve: bool,
     port: int | None,
     as_json: bool,
-) -> Result:
+) -> NextCommand:
     """Run recordings or a configuration, with the sections that the options specify over it; print the result."""
     target = places[0]
     over = over | _output_only(target, output_only, outputs, band)
@@ -122,13 +122,14 @@ def run_targets(
                         axes, directory, force, as_json, file,
                         lambda name: subscribers_of(name or target.stem), send, publisher,
                     )  # fmt: skip
-    return Result("runs" if alone is None else _kind_of_result(alone), str(place))
+    return NextCommand("view" if alone is None else _next_of(alone), place)
 
 
-def _kind_of_result(axis: Axis) -> str:
+def _next_of(axis: Axis) -> str:
+    """The command that shows most of a run."""
     if axis.kind != RESPONSE:
-        return "run"
-    return "responses" if axis.fit is None else "fitted run"
+        return "view"
+    return "fit" if axis.fit is None else "report"
 
 
 def _check_places(directory: Path, axes: Axes, *, force: bool) -> None:

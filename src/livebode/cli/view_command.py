@@ -49,7 +49,7 @@ def view_command(
     if port is None and axis is None and _is_taken(section):
         port = 0
     dashboard = dashboard_of(section, port)
-    if len(runs) == 1 and not is_run(runs[0]) and (runs[0].is_dir() or not os.path.lexists(runs[0])):
+    if len(runs) == 1 and not is_run(runs[0]) and (runs[0].is_dir() or _is_new(runs[0])):
         dashboard.view_all(runs[0])
     else:
         for run in runs:
@@ -61,6 +61,15 @@ def view_command(
 
             webbrowser.open(dashboard.url)
         wait_for_the_end()
+
+
+def _is_new(directory: Path) -> bool:
+    """Whether it could be made for runs; a missing one beside runs, or in nothing, is a name that is wrong."""
+    from livebode.records import is_run
+
+    if os.path.lexists(directory) or not directory.parent.is_dir():
+        return False
+    return not any(is_run(path) for path in directory.parent.iterdir())
 
 
 def _is_taken(section: ServeSection) -> bool:

@@ -1,6 +1,7 @@
 from livebode.core._block import Block as Block
 from livebode.core._block import Channel as Channel
 from livebode.core._block import PlantKinds as PlantKinds
+from livebode.core._block import SourceUnit as SourceUnit
 from livebode.core._block import nearest_name as nearest_name
 from livebode.core._event import Emit as Emit
 from livebode.core._event import Event as Event

@@ -43,6 +43,7 @@ from livebode.records.response_table import parameter_rows as parameter_rows
 from livebode.records.run import RunRecord as RunRecord
 from livebode.records.run import kinds_in as kinds_in
 from livebode.records.run import lines_in as lines_in
+from livebode.records.run import source_unit_in as source_unit_in
 from livebode.records.run import steady as steady
 from livebode.records.run_directory import RunDirectory as RunDirectory
 from livebode.records.sample_table import as_rows as as_rows

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from livebode.cli import Json, can_draw, console, parsed_band, tell_how_to_draw
+from livebode.cli import Json, NextCommand, can_draw, console, parsed_band, tell_how_to_draw
 from livebode.core import UsageError
 
 
@@ -38,7 +38,7 @@ def design_command(
     seed: Annotated[int | None, typer.Option(help="Random seed; the same seed gives the same excitation.")] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace the files of a previous design.")] = False,
     as_json: Json = False,
-) -> None:
+) -> NextCommand | None:
     """Choose lines, window, amplitude and hop for a machine, with reasons; write the excitation and axis.toml."""
     from livebode.plugins import loaded
     from livebode.records import to_json
@@ -58,12 +58,17 @@ def design_command(
         made = design_experiment(asked, out, name=name, suffixes=to, force=force, draw=draw)
     if as_json:
         print(to_json({"directory": str(made.directory), "files": list(made.files)} | made.design.plain()))
-        return
+        return None
     loaded(asked.terminal)(made.design)
     if made.left_out:
         print(made.left_out)
     print(f"{made.directory}/: {', '.join(made.files)}")
     tell_how_to_draw()
+    if isinstance(asked, Experiment) and asked.source is not None:
+        return NextCommand("measure", experiment, "--dry-run")
+    if isinstance(asked, Experiment) and asked.belt is not None:
+        return NextCommand("measure", experiment, "--simulated")
+    return None  # the recording comes from another program
 
 
 def _refuse_for_several(**given: object) -> None:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from livebode.cli import Json, can_draw, console
+from livebode.cli import Json, NextCommand, can_draw, console
 
 if TYPE_CHECKING:
     from livebode_design.experiment import Experiment
@@ -33,7 +33,7 @@ def measure_command(
         bool, typer.Option("--simulated", help="Play on a simulation of the \\[belt] axis in place of \\[source].")
     ] = False,
     as_json: Json = False,
-) -> None:
+) -> NextCommand | None:
     """Design an excitation, play it on the controller, record, and track the response; Ctrl-C ramps it down.
 
     A limit, a second without samples, SIGTERM and a closed terminal ramp it down, too. What was recorded remains.
@@ -54,8 +54,8 @@ def measure_command(
     if dry_run:
         if as_json:
             print(to_json({"playing": prepared.plain()} | prepared.design.plain()))
-        return
-    _measure(asked, prepared, out, as_json)
+        return NextCommand("measure", experiment, *["--simulated"] * simulated, out=out)
+    return _measure(asked, prepared, out, as_json)
 
 
 def _show_playing(prepared: ReadyMeasurement) -> None:
@@ -67,7 +67,7 @@ def _show_playing(prepared: ReadyMeasurement) -> None:
     console(markup=False).print(table)
 
 
-def _measure(asked: Experiment, prepared: ReadyMeasurement, out: Path, as_json: bool) -> None:
+def _measure(asked: Experiment, prepared: ReadyMeasurement, out: Path, as_json: bool) -> NextCommand:
     from livebode.cli import run_targets
     from livebode.locations import location
     from livebode.plugins import loaded
@@ -82,7 +82,7 @@ def _measure(asked: Experiment, prepared: ReadyMeasurement, out: Path, as_json: 
     if signals:
         say("the measurement was stopped, and not tracked")
         raise KeyboardInterrupt if signals[0] == signal.SIGINT else SystemExit(128 + signals[0])
-    run_targets(
+    return run_targets(
         [location(str(out / "axis.toml"))], {}, [], output_only=False, band=None, out=str(out / "run"),
         force=False, serve=False, port=None, as_json=as_json,
     )  # fmt: skip

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from livebode.cli import Json
+from livebode.cli import Json, NextCommand
 from livebode.core import OutputError, output_files
 
 
@@ -37,7 +37,7 @@ def plc_command(
         ),
     ] = False,
     as_json: Json = False,
-) -> None:
+) -> NextCommand | None:
     """Write function blocks for the PLC of an axis: excitation, sliding DFT and the ring buffer that livebode reads."""
     from livebode.configuration import Axis
     from livebode.records import to_json
@@ -61,11 +61,12 @@ def plc_command(
     if as_json:
         source = {"symbol": "MAIN.livebode", "channels": list(project.columns)}
         print(to_json({"files": [str(out / name) for name in files], "source": source}))
-        return
+        return None
     for name in files:
         print(out / name)
     columns = ", ".join(f'"{name}"' for name in project.columns)
     print(f'Settings of [source] that read it: symbol = "MAIN.livebode", channels = [{columns}]')
+    return NextCommand("doctor", axis)
 
 
 def _with_own_main(folder: Path, files: dict[str, str]) -> dict[str, str]:

@@ -65,13 +65,15 @@ def test_what_a_source_sends_is_tracked_checked_listed_and_replayed(
         monkeypatch.setattr(sys, "stdin", lines)
         sent = livebode("fleet", "send", tmp_path / "axis.toml", fleet)
     assert sent.code == 0, sent.err
-    assert sent.out.endswith(f"the log has stored {BATCHES} messages\n")
+    status_next = f"Next: livebode fleet status {fleet}\n"
+    assert sent.out.endswith(f"the log has stored {BATCHES} messages\n{status_next}")
     settings = FleetSettings.read(fleet)
     owned_until_current(settings.log, settings.read_axes())
 
     checked = livebode("fleet", "replay", fleet)
     assert checked.out == (
         f"{2 * BATCHES} responses (axes: 1): 0 missing, 0 doubled, 0 different from one uninterrupted computation\n"
+        + status_next
     )
     found = json.loads(livebode("fleet", "replay", fleet, "--json").out)
     assert found["axes"]["Graz/x"]["responses"] == 2 * BATCHES
@@ -79,7 +81,9 @@ def test_what_a_source_sends_is_tracked_checked_listed_and_replayed(
     status = json.loads(livebode("fleet", "status", fleet, "--json").out)
     assert [axis["axis"] for axis in status["axes"]] == ["Graz/x"]
     assert status["alarms"] == []
-    assert "axes: 1 with data, 0 without" in livebode("fleet", "status", fleet).out
+    listed = livebode("fleet", "status", fleet).out
+    assert "axes: 1 with data, 0 without" in listed
+    assert listed.endswith(f"Next: livebode fleet status {fleet} --serve\n")
 
     replayed = livebode("fleet", "replay", fleet, "Graz/x", "--out", tmp_path / "x.parquet")
     assert replayed.code == 0, replayed.err
@@ -97,12 +101,15 @@ def test_a_sink_and_a_sender_end_in_order_at_the_signal_of_a_service_manager(fle
     with Command("fleet", "sink", fleet) as sink, Command("fleet", "send", axis, fleet) as sender:
         sender.stdin.write(encode_line(batch(0, 0)))
         sender.stdin.flush()
-        for one, last in ((sink, b"0 events stored\n"), (sender, b"the log has stored 1 messages\n")):
+        of_sink = f"0 events stored\nNext: livebode archive list {fleet.parent / 'lake'}\n"
+        of_sender = f"the log has stored 1 messages\nNext: livebode fleet status {fleet}\n"
+        for one, last in ((sink, of_sink.encode()), (sender, of_sender.encode())):
             until(lambda one=one: b"Ctrl-C ends" in one.printed, "its first line")
             one.send_signal(number)
             one.wait(PATIENCE_S)  # its standard input is open: nothing else ends it
             out, err = one.communicate()
             assert (one.returncode, out[-len(last) :], err) == (0, last, b"")
+    assert livebode("archive", "list", fleet.parent / "lake").code == 0
 
 
 def test_the_configuration_of_the_server_has_the_limits_and_the_partitions(tmp_path: Path) -> None:

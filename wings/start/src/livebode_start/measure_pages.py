@@ -20,7 +20,7 @@ from livebode.records import to_json
 from livebode_start.jobs import JobOrder, Jobs
 from livebode_start.listening import Listening, stem_of
 from livebode_start.preview import POINTS_MAX
-from livebode_start.recordings import Choices, OpenedRecording, OpenedRecordings, proposed
+from livebode_start.recordings import Choices, OpenedRecording, OpenedRecordings
 from livebode_start.results import Results
 from livebode_start.uploads import UPLOAD_BYTES_MAX, Uploads
 from livebode_start.workspace import Workspace
@@ -172,7 +172,7 @@ class MeasurePages:
         if choices.baseline:
             Results(self._workspace.directory).check("baselines", choices.baseline)
         stem = self._workspace.free_stem(Path(opened.name).stem if opened.heard is None else stem_of(opened.name))
-        answer = proposed(opened, choices).plain(opened.name)
+        answer = opened.proposed(choices).plain(opened.name)
         return stem, answer | {"command": f"livebode run {stem}.toml --out={stem}", "file": f"{stem}.toml"}
 
     async def _read(self, job: Callable[[], T]) -> T:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
@@ -14,7 +14,16 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from livebode.core import ServerError, UsageError
 from livebode.language import Message, for_page
 from livebode.plugins import named
-from livebode.preparation import Guess, Proposals, Settled, chosen_part, settled, suitable_estimator, tables_of
+from livebode.preparation import (
+    Guess,
+    Proposals,
+    Settled,
+    chosen_part,
+    settled,
+    suitable_estimator,
+    suitable_model,
+    tables_of,
+)
 from livebode.sources import Log, open_log
 from livebode.sources.live import Survey
 from livebode_start.listening import log_of_heard, shown
@@ -103,6 +112,7 @@ class OpenedRecording:
     source: Mapping[str, Any]
     log: Log
     heard: Mapping[str, Any] | None = None
+    _newest: tuple[Choices, ProposedConfiguration] | None = field(default=None, init=False, repr=False)
 
     @cached_property
     def proposals(self) -> Proposals:
@@ -153,6 +163,18 @@ class OpenedRecording:
             },
         }
 
+    def proposed(self, choices: Choices) -> ProposedConfiguration:
+        """The configuration of these choices, found and checked as `livebode inspect --out` does it.
+
+        Raises
+        ------
+        LivebodeError
+            If the recording contradicts them, or they do not suffice.
+        """
+        if self._newest is None or self._newest[0] != choices:  # the lines of a long recording take seconds
+            self._newest = choices, _found(self, choices)
+        return self._newest[1]
+
     @cached_property
     def guesses(self) -> dict[str, Guess]:
         """The proposed channel of each role, or None, with the reason."""
@@ -176,10 +198,10 @@ class ProposedConfiguration:
         return {
             "text": self.settled.text(recording),
             "lines": lines or None,
-            "lines_found": comments.get(("lines", "frequencies"), ""),
-            "window_found": comments.get(("lines", "window"), ""),
+            "lines_found": for_page(comments.get(("lines", "frequencies"), "")),
+            "window_found": for_page(comments.get(("lines", "window"), "")),
             "estimator": self.estimator,
-            "estimator_reason": self.estimator_reason,
+            "estimator_reason": for_page(self.estimator_reason),
             "average": self.average,
             "model": self.model,
             "doubts": [for_page(doubt) for doubt in self.settled.doubts],
@@ -222,21 +244,14 @@ class OpenedRecordings:
         return self._opened[key]
 
 
-def proposed(opened: OpenedRecording, choices: Choices) -> ProposedConfiguration:
-    """The configuration of these choices, found and checked as `livebode inspect --out` does it.
-
-    Raises
-    ------
-    LivebodeError
-        If the recording contradicts them, or they do not suffice.
-    """
+def _found(opened: OpenedRecording, choices: Choices) -> ProposedConfiguration:
     signals: dict[str, str] = {role: name for role, name in choices.signals.items() if name}
     _check_signals(signals)
     log = chosen_part(opened.log, choices.begin_s, choices.end_s, 0, _no_periods)
     estimator, reason = suitable_estimator(log, signals)
     estimator = choices.estimator or estimator
     average = "schedule" not in signals and not choices.baseline if choices.average is None else choices.average
-    model = choices.model or "none"
+    model = choices.model or suitable_model(log, signals)
     source = {**opened.source, "from": choices.begin_s, "to": choices.end_s}
     tables = tables_of(source, signals, estimator=estimator, average=average, model=model)
     if choices.baseline:

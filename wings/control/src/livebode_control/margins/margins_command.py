@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from livebode.cli import Entry, Json, results_directory
+from livebode.cli import Entry, Json, NextCommand, results_directory
 from livebode.core import RecordError, writing
 from livebode.locations import location
 
@@ -27,7 +27,7 @@ def margins_command(
     entry: Entry = None,
     max_sensitivity: Annotated[float, typer.Option(help="Largest permitted peak sensitivity Ms.")] = 2.0,
     as_json: Json = False,
-) -> None:
+) -> NextCommand | None:
     """Compute gain, phase and delay margin, Ms and bandwidth of the loop, with bounds; propose a filter if needed.
 
     Writes margins.png to the run directory.
@@ -46,10 +46,11 @@ def margins_command(
             save_loop_picture(loop.report, into, title=directory.name)
     if as_json:
         print(to_json(loop.plain()))
-        return
+        return None
     show_loop(loop)
     print(f"\n{into / 'margins.png'}" if can_draw() else "")
     tell_how_to_draw()
+    return NextCommand("tune" if loop.tuning.proposals else "report", directory, entry=entry)
 
 
 def show_loop(of: LoopMargins) -> None:

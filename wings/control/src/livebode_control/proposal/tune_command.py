@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from livebode.cli import Entry, Json, check_use, results_directory
+from livebode.cli import Entry, Json, NextCommand, check_use, results_directory
 from livebode.core import RecordError, TuneError, UsageError, write_whole, writing
 from livebode.locations import location
 
@@ -85,7 +85,7 @@ def tune_command(
         Literal["x", "y", "z"], typer.Option(help="For --shaper: axis in the text for Klipper.")
     ] = "x",
     as_json: Json = False,
-) -> None:
+) -> NextCommand:
     """Propose gains and filters for the described cascade, safe for every plant within bounds; or input shapers.
 
     Writes tune.png, the gains as gains.toml, the filters as filters.h and filters.st, and for `livebode report` the
@@ -101,7 +101,7 @@ def tune_command(
         from livebode_control.proposal.shaper_output import propose_shaper
 
         propose_shaper(directory, model, mode, tolerance, klipper_axis, as_json=as_json)
-        return
+        return NextCommand("report", directory)
     if entry is not None and (schedule or strokes is not None):
         raise _not_of_an_entry()
     from livebode.cli import can_draw, tell_how_to_draw
@@ -172,6 +172,7 @@ def tune_command(
             bandwidth_hz=proposal.promised.bandwidth_hz,
             limited_by=list(proposal.limited_by),
         )
+    return NextCommand("report", directory, entry=entry)
 
 
 def _not_of_an_entry() -> UsageError:

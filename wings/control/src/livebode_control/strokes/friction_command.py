@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from livebode.cli import From, Json, Rate, Time, To, console, results_directory
+from livebode.cli import From, Json, NextCommand, Rate, Time, To, console, results_directory
 from livebode.core import OutputError, writing
 from livebode.locations import location
 
@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from livebode_control.strokes.friction import FrictionReport
 
 _WIDTH_MAX = 4096
+_PLACES = 8
+"""Positions along the travel in the command that is proposed next."""
 _WORDS = {
     "inertia": "inertia",
     "coulomb": "Coulomb",
@@ -51,7 +53,7 @@ def friction_command(
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace an existing picture.")] = False,
     as_json: Json = False,
-) -> None:
+) -> NextCommand | None:
     """Find Coulomb, viscous and Stribeck friction from usual strokes, by direction and position, with bounds.
 
     The channels default to those of the run or configuration. The strokes need no excitation; it does not disturb
@@ -79,11 +81,14 @@ def friction_command(
             save_friction_picture(report, into, title=Path(target).name)
     if as_json:
         print(to_json(report.plain()))
-        return
+        return None
     show_friction(report)
     if into is not None:
         print(f"\n{into}" if can_draw() else "")
         tell_how_to_draw()
+    if not places and picture is None:
+        return NextCommand.again(places=_PLACES)
+    return None if strokes.run is None else NextCommand("report", strokes.run)
 
 
 def show_friction(report: FrictionReport) -> None:

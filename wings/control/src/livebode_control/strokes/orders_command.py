@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from livebode.cli import From, Json, Rate, Time, To, console, results_directory
+from livebode.cli import From, Json, NextCommand, Rate, Time, To, console, results_directory
 from livebode.core import OutputError, UsageError, counted, writing
 from livebode.locations import location
 
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from livebode_control.strokes.shaft_orders import ShaftOrders
 
 _POINTS = 512
+_TABLE = "feedforward.csv"
 
 
 def orders_command(
@@ -69,7 +70,7 @@ def orders_command(
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace an existing table or picture.")] = False,
     as_json: Json = False,
-) -> None:
+) -> NextCommand | None:
     """Find torque that repeats with the angle: cogging, eccentricity, gears; write a feedforward table.
 
     Shafts and channels default to those of the run or configuration, and the orders to 1 … 48 of the motor. Lines of
@@ -121,7 +122,7 @@ def orders_command(
     if as_json:
         more = {} if changes is None else {"changes": [change.plain() for change in changes]}
         print(to_json(report.plain() | more))
-        return
+        return None
     show_orders(report)
     if changes is not None:
         show_changes(changes, report, Path(str(baseline)).name)
@@ -130,6 +131,14 @@ def orders_command(
     if into is not None:
         print(f"\n{into}" if can_draw() else "")
         tell_how_to_draw()
+    return _next(report, motion.run, written=table is not None or picture is not None)
+
+
+def _next(report: OrderReport, run: Path | None, *, written: bool) -> NextCommand | None:
+    """The same with a feedforward table, where one can be written; else the report of a run."""
+    if not written and _motor(report) is not None and not Path(_TABLE).exists():
+        return NextCommand.again(table=_TABLE)
+    return None if run is None else NextCommand("report", run)
 
 
 def _shaft(text: str) -> Shaft:
@@ -168,13 +177,18 @@ def _lines(text: str | None, motion: MotionSamples) -> Any:
         ) from None
 
 
+def _motor(report: OrderReport) -> ShaftOrders | None:
+    """The orders of the motor; None if none of them is seen."""
+    return next((shaft for shaft in report.shafts if shaft.shaft.turns == 1 and shaft.seen.any()), None)
+
+
 def _write_table(report: OrderReport, path: Path, target: str) -> None:
     import numpy as np
 
     from livebode_control.strokes.angle_table import write_angle_table
 
-    motor = next((shaft for shaft in report.shafts if shaft.shaft.turns == 1), None)
-    if motor is None or not motor.seen.any():
+    motor = _motor(report)
+    if motor is None:
         raise UsageError(
             "conflict",
             "no order of the motor is seen, so that there is nothing to feed forward",

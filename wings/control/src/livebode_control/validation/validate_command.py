@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from livebode.cli import Entry, Excitation, Json, Output, check_use, results_directory
+from livebode.cli import Entry, Excitation, Json, NextCommand, Output, check_use, results_directory
 from livebode.core import LivebodeError, RecordError, UsageError, writing
 from livebode.locations import location
 
@@ -54,7 +54,7 @@ def validate_command(
     ] = False,
     entry: Entry = None,
     as_json: Json = False,
-) -> None:
+) -> NextCommand:
     """Test the fitted model on another recording, or with --loop the described controllers on the recorded signals.
 
     With --on, the model is simulated with the other recording, and the residual is tested for correlation with the
@@ -74,10 +74,11 @@ def validate_command(
         from livebode_control.loop_check.loop_check_command import validate_loop
 
         validate_loop(directory, axis, channels, as_json=as_json)
-    elif on is None:
+        return NextCommand("report", directory)
+    if on is None:
         raise _nothing_to_validate()
-    else:
-        _validate_model(directory, on, model or [], samples, channels, at_lines, entry, as_json=as_json)
+    _validate_model(directory, on, model or [], samples, channels, at_lines, entry, as_json=as_json)
+    return NextCommand("report", directory, entry=entry)
 
 
 def _nothing_to_validate() -> UsageError:

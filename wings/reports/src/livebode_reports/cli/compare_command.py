@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 import typer
 
-from livebode.cli import Entry, Json, ReportLanguage, with_keys
+from livebode.cli import Entry, Json, NextCommand, ReportLanguage, with_keys
 from livebode.core import UsageError
 from livebode.locations import location
 from livebode_reports.cli.report_options import FIRST_PAGE, Appendix, Ask, Template, header
@@ -48,7 +48,7 @@ def compare_command(
     ask: Ask = False,
     appendix: Appendix = False,
     as_json: Json = False,
-) -> None:
+) -> NextCommand | None:
     """Find the lines, parameters and margins that differ between two runs, with amounts and bounds.
 
     A line differs if chance does not explain it; with --ignore-below only if |after/before − 1| is that large too.
@@ -78,9 +78,10 @@ def compare_command(
             files, remark = write_documents(document, out, force=force)
     if as_json:
         print(to_json(comparison.plain()))
-        return
+        return None
     for line in (*comparison.printed, *filter(None, (*files, remark))):
         print(line)
+    return NextCommand("view", before, after)
 
 
 def _one_response() -> UsageError:

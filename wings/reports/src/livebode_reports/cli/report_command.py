@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-from livebode.cli import Entry, Json, ReportLanguage, results_directory, with_keys
+from livebode.cli import Entry, Json, NextCommand, ReportLanguage, results_directory, with_keys
 from livebode.estimates import kind_of
 from livebode.locations import location
 from livebode_reports.cli.report_options import FIRST_PAGE, Appendix, Ask, Template, header
@@ -46,7 +46,7 @@ def report_command(
         bool, typer.Option("--check", help="Exit code 4 unless all limits are met; without limits, a usage error.")
     ] = False,
     as_json: Json = False,
-) -> None:
+) -> NextCommand:
     """Write the measurement and its results as report.html and report.pdf, with the verdict on page 1.
 
     The first page and the limits are from the [report] of the axis.toml with which the run was recorded, from
@@ -87,6 +87,7 @@ def report_command(
             print(line)
     if check and set(results) != {"pass"}:
         raise typer.Exit(_NOT_ALL_MET)
+    return NextCommand("view", directory)
 
 
 def _counted(results: Sequence[str]) -> str:

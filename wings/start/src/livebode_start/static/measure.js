@@ -36,15 +36,17 @@ import { plain } from "./words.js";
  * @typedef {object} Configuration
  * @property {string} text
  * @property {{frequencies: string, window: number} | null} lines
- * @property {string} lines_found
- * @property {string} window_found
+ * @property {Words} lines_found
+ * @property {Words} window_found
  * @property {string} estimator
- * @property {string} estimator_reason
+ * @property {Words} estimator_reason
  * @property {boolean} average
  * @property {string} model
  * @property {Words[]} doubts
  * @property {string} command
  */
+
+/** @typedef {{job: string, run: string}} Started */
 
 const SETTLE_MS = 250,
   LOOK_MS = 500;
@@ -102,7 +104,8 @@ function show(facts) {
     settle();
   });
   for (const name of facts.estimators) estimator.append(element("option", { value: name }, name));
-  for (const name of facts.models) model.append(element("option", { value: name }, name));
+  for (const name of facts.models)
+    model.append(element("option", { value: name }, name === "none" ? tr("none") : name));
   from.placeholder = plain(facts.begin_s, 6);
   to.placeholder = plain(facts.end_s, 6);
 
@@ -137,26 +140,32 @@ function show(facts) {
       $("ready").textContent = reason(error);
       $("ready").className = "wrong";
       $("toml").hidden = true;
+      $("lines-found").textContent = $("window-found").textContent = "";
     }
   }
 
-  async function run() {
+  /** @param {() => Promise<Started>} start */
+  async function run(start) {
     measure.disabled = true;
     $("ready").textContent = tr("Measuring …");
     $("ready").className = "";
     try {
-      const { job, run } = await post("/api/measure", choices());
+      const { job, run } = await start();
+      // The address has the job, so that it is followed again after a reload.
+      history.replaceState(null, "", `#${new URLSearchParams({ job, run })}`);
       $("ready").hidden = measure.hidden = true;
       // A live measurement lasts until somebody finishes it, on the page of its run.
       const ends = [followJob($("job"), job, tr("Measuring …")), ...(facts.heard ? [recorded(run)] : [])];
       const ended = await Promise.race(ends);
+      forgetJob();
       if (ended === null || ended.state === "done") {
         location.assign(`/run/${encodeURIComponent(run)}/`);
         return;
       }
-      $("job").replaceChildren();
       throw new Error(ended.state === "stopped" ? tr("The measurement was cancelled.") : ended.sentence);
     } catch (error) {
+      forgetJob();
+      $("job").replaceChildren();
       $("ready").hidden = measure.hidden = measure.disabled = false;
       $("ready").textContent = reason(error);
       $("ready").className = "wrong";
@@ -190,7 +199,7 @@ function show(facts) {
     used();
     settle();
   });
-  measure.addEventListener("click", run);
+  measure.addEventListener("click", () => run(() => post("/api/measure", choices())));
   json("/api/task", { task: "learn" })
     .then(({ results }) => {
       for (const { name } of results) baseline.append(element("option", { value: name }, name));
@@ -198,8 +207,12 @@ function show(facts) {
     .catch(complain);
   signals.mark(roles.chosen);
   signals.fetch();
+  const { job, run: name } = Object.fromEntries(new URLSearchParams(location.hash.slice(1)));
   propose();
+  if (job && name) run(async () => ({ job, run: name }));
 }
+
+const forgetJob = () => history.replaceState(null, "", location.pathname + location.search);
 
 /**
  * What came from a live source, whose rate can be corrected; a measurement of it has no span.
@@ -245,10 +258,10 @@ function fill(found) {
     frequencies.value = found.lines?.frequencies ?? "";
     window_.value = found.lines ? String(found.lines.window) : "";
   }
-  $("lines-found").textContent = found.lines_found;
-  $("window-found").textContent = found.window_found;
+  $("lines-found").textContent = worded(found.lines_found);
+  $("window-found").textContent = worded(found.window_found);
   estimator.value = found.estimator;
-  $("estimator-found").textContent = found.estimator_reason;
+  $("estimator-found").textContent = worded(found.estimator_reason);
   average.checked = found.average;
   model.value = found.model;
   $("text").textContent = found.text;
@@ -257,7 +270,7 @@ function fill(found) {
   const doubts = found.doubts.map((doubt) => worded(doubt));
   $("ready").textContent = doubts.length
     ? doubts.join(" ")
-    : [found.lines_found, tr("ready to measure")].filter(Boolean).join(" · ");
+    : [worded(found.lines_found), tr("ready to measure")].filter(Boolean).join(" · ");
   $("ready").className = doubts.length ? "doubt" : "";
   measure.disabled = false;
 }

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from livebode.cli import Json
+from livebode.cli import Json, NextCommand
 from livebode.core import ArchiveError, UsageError
 from livebode_plant.cli.archive.selection import LakeOf, SelectionOptions, print_table, with_selection
 
@@ -30,7 +30,7 @@ def compare_command(
         str | None, typer.Option(metavar="DATE", help="Compare the runs before this day with those from it on.")
     ] = None,
     as_json: Json = False,
-) -> None:
+) -> NextCommand | None:
     """Find the quantities that differ between two axes, or between two spans of one, with bounds.
 
     The influence of the covariates is removed. An asterisk marks what chance does not explain: at most 5 % of the
@@ -49,13 +49,15 @@ def compare_command(
     different, few = differences(_pairs(Lake(lake_url(archive)), chosen.selection(), first.strip("/"), second, split))
     if as_json:
         print(to_json({"differences": [vars(difference) for difference in different], "too_few_runs": few}))
-        return
+        return None
     if different:
         print_table(_COLUMNS, map(_row, different))
     for name in few:
         print(f"{name}: not compared: fewer than 8 runs on a side")
     if any(difference.significant for difference in different):
         print("*: at most 5 % of the differences marked are expected to be none")
+    names = [f"{difference.model}:{difference.name}" for difference in different]
+    return NextCommand("archive", *(["trend", archive, names[0]] if names else ["list", archive]))
 
 
 def _row(of: LevelDifference) -> tuple[str, ...]:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from livebode.cli import Json, console
+from livebode.cli import Json, NextCommand, console
 from livebode.core import ConfigError, LivebodeError, UsageError, counted
 from livebode_plant.cli.archive.selection import LakeOf, SelectionOptions, with_selection
 
@@ -49,7 +49,7 @@ def learn_command(
         ),
     ] = None,
     as_json: Json = False,
-) -> None:
+) -> NextCommand:
     """Learn a baseline of one machine, or of each machine of a hall, from its healthy runs in the lake.
 
     Nothing is tracked again. Only a model of a moving machine needs the recordings, which are then read where the
@@ -91,6 +91,8 @@ def learn_command(
             print(f"livebode: {axis}: {why}", file=sys.stderr)
     if refused:
         raise typer.Exit(_REFUSED)
+    compares = settings is not None and settings.baselines is not None
+    return NextCommand("archive", "run" if compares else "list", archive)
 
 
 def _settings(archive: str) -> ArchiveSettings | None:

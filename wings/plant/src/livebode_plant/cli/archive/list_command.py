@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from livebode.cli import Csv, Json, RowsMax, check_query, print_result
+from livebode.cli import Csv, Json, NextCommand, RowsMax, check_query, print_result
 from livebode_plant.cli.archive.selection import LakeOf, print_table
 
 _COLUMNS = ("machine", "runs", "judged", "alarming", "quarantined", "first", "last")
@@ -29,7 +30,7 @@ def list_command(
     rows: RowsMax = 1000,
     as_csv: Csv = False,
     as_json: Json = False,
-) -> None:
+) -> NextCommand | None:
     """List the runs of a lake by machine, and the recordings in quarantine; with --sql, query its tables.
 
     A query has no access to files, and does not see results that are not complete.
@@ -41,11 +42,12 @@ def list_command(
 
     check_query(context, as_csv=as_csv, as_json=as_json)
     lake = Lake(lake_url(archive))
+    is_configuration = archive.lower().endswith(".toml")
     if sql is not None:
         from livebode_plant.lake.query import query_lake
 
         print_result(query_lake(lake, sql, rows), rows, as_csv=as_csv, as_json=as_json)
-        return
+        return None
     if quarantined:
         bad = quarantine(lake)
         if as_json:
@@ -54,12 +56,15 @@ def list_command(
             print_table(("recording", "code", "reason"), [(row["url"], row["code"], row["sentence"]) for row in bad])
         else:
             print("no recording is in quarantine")
-        return
+        return NextCommand("archive", "run", archive, retry="all") if bad and is_configuration else None
     rows_of_machines = [row.plain for row in machines(lake)]
     if as_json:
         print(to_json({"machines": rows_of_machines}))
     elif rows_of_machines:
         words = [["" if value is None else str(value) for value in row.values()] for row in rows_of_machines]
         print_table(_COLUMNS, words, _COLUMNS[1:5])
+        return None if Path("hall-report.html").exists() else NextCommand("archive", "trend", archive)
     else:
         print(f"the lake {lake.url} has no run yet")
+        return NextCommand("archive", "run", archive) if is_configuration else None
+    return None

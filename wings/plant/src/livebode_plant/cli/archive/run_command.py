@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 import typer
 
-from livebode.cli import Json, check_use, console
+from livebode.cli import Json, NextCommand, check_use, console
 from livebode_plant.cli.archive.selection import LakeOf
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ def run_command(
         ),
     ] = False,
     as_json: Json = False,
-) -> None:
+) -> NextCommand:
     """Track the recordings of an archive that its lake does not have yet.
 
     A recording that cannot be tracked goes to quarantine with the reason. Ctrl-C ends with whole results; the same
@@ -50,6 +50,7 @@ def run_command(
         track(Path(archive), lambda coordinator: coordinator.retry(retry == "older"), as_json=as_json)
     else:
         track(Path(archive), lambda coordinator: coordinator.run(), as_json=as_json)
+    return NextCommand("archive", "list", archive)
 
 
 def _compact(archive: str, *, as_json: bool) -> None:

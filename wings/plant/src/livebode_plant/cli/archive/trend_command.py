@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from livebode.cli import Json, ReportLanguage
+from livebode.cli import Json, NextCommand, ReportLanguage
 from livebode.core import UsageError
 from livebode_plant.cli.archive.selection import By, LakeOf, Limit, SelectionOptions, print_table, with_selection
 
 if TYPE_CHECKING:
     from livebode_plant.lake import Lake
+    from livebode_plant.report.hall_report import Hall
     from livebode_plant.trending import Assessment, Ranked, Selection
 
 
@@ -42,7 +43,7 @@ def trend_command(
     language: ReportLanguage = None,
     force: Annotated[bool, typer.Option("--force", help="Replace existing files.")] = False,
     as_json: Json = False,
-) -> None:
+) -> NextCommand | None:
     """Find how a quantity changes over months, for each machine; without QUANTITY, write all of them as one page.
 
     The influence of covariates, such as a temperature, is removed. Bounds cover 95 % and allow for outliers and for
@@ -64,8 +65,11 @@ def trend_command(
     lake = Lake(lake_url(archive))
     if quantity is None:
         pages = out or Path("hall-report")
-        write_hall_pages(lake, chosen.selection(), name, limit, language or "en", pages, force=force, as_json=as_json)
-        return
+        hall = write_hall_pages(
+            lake, chosen.selection(), name, limit, language or "en", pages, force=force, as_json=as_json
+        )
+        names = [f"{of.history.model}:{of.history.name}" for of in hall.assessments if of.ranked]
+        return NextCommand("archive", "trend", archive, names[0]) if names else None
     if out is not None and not picture:
         raise UsageError(
             "unreadable", f"--out={str(out)!r} is neither a .png nor a .csv", "choose one of them", argument="--out"
@@ -76,10 +80,11 @@ def trend_command(
         _write(of, out, dark=dark, force=force)
     if as_json:
         print(to_json(plain(of)))
-        return
+        return None
     _print(of, limit)
     if out is not None:
         print(out)
+    return NextCommand("archive", "list", archive)
 
 
 def _check(quantity: str | None, of_one: dict[str, Any], of_all: dict[str, Any]) -> None:
@@ -226,7 +231,7 @@ def _day(time_s: float) -> str:
 
 def write_hall_pages(
     lake: Lake, of: Selection, name: str, limit: float, language: str, out: Path, *, force: bool, as_json: bool
-) -> None:
+) -> Hall:
     """Write HTML and PDF with the trends of all quantities and machines, and print their names."""
     from livebode.core import document_function
     from livebode.language import in_language
@@ -242,6 +247,7 @@ def write_hall_pages(
         files, remark = document_function("files")(hall.document(datetime.now(UTC)), out, force=force)
     if as_json:
         print(to_json({"files": list(map(str, files))} | hall.plain()))
-        return
+        return hall
     for line in filter(None, (*files, remark)):
         print(line)
+    return hall

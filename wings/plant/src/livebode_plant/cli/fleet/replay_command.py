@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from livebode.cli import Json
+from livebode.cli import Json, NextCommand
 from livebode_plant.cli.fleet.options import Fleet
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ def replay_command(
     ] = None,
     out: Annotated[Path, typer.Option(metavar="FILE", help="Parquet file to write for AXIS.")] = Path("replay.parquet"),
     as_json: Json = False,
-) -> None:
+) -> NextCommand:
     """Compute results again from the log: compare the stored ones bit for bit, or write those of an AXIS.
 
     The fleet may run meanwhile. Exit code 2 if a response, parameter or event is missing, doubled or different. Of an
@@ -40,6 +40,7 @@ def replay_command(
         _compare(settings, as_json=as_json)
     else:
         _write(settings, axis, 0.0 if from_ is None else from_.timestamp(), out, as_json=as_json)
+    return NextCommand("fleet", "status", fleet)
 
 
 def _compare(settings: FleetSettings, *, as_json: bool) -> None:

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from livebode.cli import Json
+from livebode.cli import Json, NextCommand
 from livebode.core import UsageError, calls_at_end
 
 _STEP_S = 0.25
@@ -29,7 +29,7 @@ def run_command(
         ),
     ] = False,
     as_json: Json = False,
-) -> None:
+) -> NextCommand:
     """Start the workers of a fleet on this computer, and replace those that end or freeze, until Ctrl-C or SIGTERM.
 
     Nothing has to be ended in order: what is not stored yet is computed again from the log at the next start.
@@ -43,8 +43,9 @@ def run_command(
         )
     if fleet is None:
         _run_demo(as_json=as_json)
-    else:
-        _run(fleet, as_json=as_json)
+        return NextCommand("fleet", "status", demo=_DEMO_AXES)
+    _run(fleet, as_json=as_json)
+    return NextCommand("fleet", "status", fleet)
 
 
 def _run(fleet: Path, *, as_json: bool) -> None:

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from livebode.cli import Json
+from livebode.cli import Json, NextCommand
 from livebode.core import calls_at_end
 from livebode_plant.cli.fleet.options import Fleet
 
@@ -18,7 +18,7 @@ def send_command(
     axis: Annotated[Path, typer.Argument(metavar="AXIS.TOML", help="Axes with a live source and a [machine] section.")],
     fleet: Fleet,
     as_json: Json = False,
-) -> None:
+) -> NextCommand:
     """Send the samples of live sources to the log, through a buffer on disk, until they end, Ctrl-C or SIGTERM.
 
     While the log cannot be reached, also at the start, the buffer grows up to its limit; then its oldest messages are
@@ -44,3 +44,4 @@ def send_command(
                 print(f"{len(sources)} axes send to {settings.log.url}; Ctrl-C ends", flush=True)
             sent = send_sources(settings.log, sources, buffers, stop)
     print(to_json({"messages": sent}) if as_json else f"the log has stored {sent} messages")
+    return NextCommand("fleet", "status", fleet)

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from livebode.cli import Json
+from livebode.cli import Json, NextCommand
 from livebode.core import calls_at_end
 from livebode_plant.cli.fleet.options import Fleet
 
@@ -15,7 +15,7 @@ def sink_command(
     fleet: Fleet,
     once: Annotated[bool, typer.Option("--once", help="Store what the log has now, and end.")] = False,
     as_json: Json = False,
-) -> None:
+) -> NextCommand | None:
     """Store the results of a fleet in a lake, each once: all of them, their means over minutes and hours, and events.
 
     The log has them for a limited time, the lake as long as [sink] says. It ends at Ctrl-C or SIGTERM, and may be
@@ -45,7 +45,8 @@ def sink_command(
     totals = with_log(settings.log, "livebode sink", store)
     if as_json:
         print(to_json(totals.as_dict() | {"lake": url}))
-        return
+        return None
     print(f"{url}: {totals.responses:,} responses, {totals.parameters:,} parameters, {totals.events:,} events stored")
     if totals.deleted:
         print(f"{totals.deleted:,} messages of results were deleted from the log before they were read")
+    return NextCommand("archive", "list", url)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from livebode.cli import Json, Port, ServeFile, console
+from livebode.cli import Json, NextCommand, Port, ServeFile, console
 from livebode.core import UsageError
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ def status_command(
     port: Port = None,
     axis: ServeFile = None,
     as_json: Json = False,
-) -> None:
+) -> NextCommand | None:
     """Show partitions, axes, alarms, backlog and losses of a fleet; with --serve a page with a tile for each axis.
 
     Acknowledgements and shelves on the page are stored in the log of the fleet, so that all pages of it show the same.
@@ -54,8 +54,9 @@ def status_command(
         )
     if serve or fleet is None:
         serve_page(fleet, demo, plan, trends, port, axis)
-    else:
-        _print_status(fleet, as_json=as_json)
+        return None
+    _print_status(fleet, as_json=as_json)
+    return NextCommand("fleet", "status", fleet, "--serve")
 
 
 def _print_status(fleet: Path, *, as_json: bool) -> None:
