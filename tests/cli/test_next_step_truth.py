@@ -39,7 +39,7 @@ def test_from_a_recording_to_the_report_by_copying_the_last_line(
         assert result.code == 0, result.err
         commands.append(words[1])
         words = shlex.split(result.out.splitlines()[-1].removeprefix("Next: "))
-    assert commands == ["inspect", "inspect", "run", "fit", "report"]
+    assert commands == ["inspect", "inspect", "run", "report"]
     assert words == ["livebode", "view", "runs/Achse Z"]
 
 

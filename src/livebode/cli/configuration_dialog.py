@@ -202,7 +202,7 @@ class Dialog:
 
     def _tables(self, source: Mapping[str, Any], signals: dict[str, str]) -> dict[str, dict[str, Any]]:
         from livebode.plugins import named
-        from livebode.preparation import suitable_estimator, tables_of
+        from livebode.preparation import suitable_estimator, suitable_model, tables_of
 
         answers, console = self._answers, self._console
         if "estimator" not in answers:
@@ -212,7 +212,8 @@ class Dialog:
             still = "schedule" not in signals
             answers["average"] = _agrees(console, "Average over all periods, for a standstill", still)
         if "fit" not in answers:
-            answers["fit"] = _ask(console, "Model to fit to the responses", "none", ("none", "auto", *named("models")))
+            suits = suitable_model(self._proposals, signals, answers["estimator"])
+            answers["fit"] = _ask(console, "Model to fit to the responses", suits, ("none", "auto", *named("models")))
         estimator, average, model = (answers[key] for key in ("estimator", "average", "fit"))
         return tables_of(source, signals, estimator=estimator, average=average, model=model)
 

@@ -16,6 +16,7 @@ from livebode.preparation.checks import check_some_valid as check_some_valid
 from livebode.preparation.configuring import Settled as Settled
 from livebode.preparation.configuring import settled as settled
 from livebode.preparation.configuring import suitable_estimator as suitable_estimator
+from livebode.preparation.configuring import suitable_model as suitable_model
 from livebode.preparation.configuring import tables_of as tables_of
 from livebode.preparation.contents import ChannelSummary as ChannelSummary
 from livebode.preparation.contents import contents_of as contents_of

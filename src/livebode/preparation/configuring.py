@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import tomli_w
 
@@ -17,7 +17,14 @@ from livebode.preparation.nonperiodic import suits_lpm
 from livebode.preparation.plan import Recorded, beginning, roles_in_doubt
 from livebode.sources import Log
 
+if TYPE_CHECKING:
+    from livebode.preparation.proposal import Proposals
+
 _NOT_REPEATING = ("signal.not-periodic", "signal.too-short")
+_FITTED = ("velocity", "position")
+_PERIODIC = ("joint", "direct")
+_FITTED_LINES_MIN = 4
+"""Complex values for the six free parameters of two masses with an unknown gain."""
 _COLUMN = 28  # of the comments
 
 Tables = dict[str, dict[str, Any]]
@@ -62,6 +69,19 @@ def suitable_estimator(log: Recorded, signals: Mapping[str, str]) -> tuple[str, 
     if "excitation" not in signals:
         return "direct", "without the excitation: for an open loop"
     return "joint", "for a machine in a control loop, whose excitation repeats"
+
+
+def suitable_model(proposals: Proposals, signals: Mapping[str, str], estimator: str) -> str:
+    """The model to fit for these roles: "auto" for a velocity or a position with enough lines, else "none"."""
+    kinds = {channel.name: channel.kind for channel in proposals.channels}
+    reference = signals.get("excitation") or signals.get("input")
+    if reference is None or kinds.get(signals["output"]) not in _FITTED or estimator not in _PERIODIC:
+        return "none"
+    try:
+        found = recognise(beginning(proposals.log, reference), proposals.log.rate_hz)
+    except LivebodeError:  # a run gives the reason
+        return "none"
+    return "auto" if len(found.lines) >= _FITTED_LINES_MIN else "none"
 
 
 def tables_of(

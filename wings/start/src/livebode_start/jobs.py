@@ -242,10 +242,10 @@ def last_sentence(lines: list[str], *, failed: bool) -> str:
     "no such file 'a.csv'; check its name"
     >>> last_sentence(["╭─ Error ────╮", "│ No such    │", "│ option     │", "╰────────────╯"], failed=True)
     'No such option'
-    >>> last_sentence(["Learned from 380 windows.", "baselines/x.json", ""], failed=False)
+    >>> last_sentence(["baselines/x.json", "", "Next: livebode learn --history baselines/x.json"], failed=False)
     'baselines/x.json'
     """
-    filled = [line for line in lines if line.strip()]
+    filled = [line for line in lines if line.strip() and not line.startswith("Next: ")]  # that is for a terminal
     if failed:
         starts = [number for number, line in enumerate(filled) if line.startswith("livebode: ")]
         if starts:

@@ -13,7 +13,16 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from livebode.core import ServerError, UsageError
 from livebode.language import Message, for_page
 from livebode.plugins import named
-from livebode.preparation import Guess, Proposals, Settled, chosen_part, settled, suitable_estimator, tables_of
+from livebode.preparation import (
+    Guess,
+    Proposals,
+    Settled,
+    chosen_part,
+    settled,
+    suitable_estimator,
+    suitable_model,
+    tables_of,
+)
 from livebode.sources import Log, open_log
 from livebode_start.preview import Overview
 
@@ -211,7 +220,7 @@ def proposed(opened: OpenedRecording, choices: Choices) -> ProposedConfiguration
     estimator, reason = suitable_estimator(log, signals)
     estimator = choices.estimator or estimator
     average = "schedule" not in signals and not choices.baseline if choices.average is None else choices.average
-    model = choices.model or "none"
+    model = choices.model or suitable_model(opened.proposals, signals, estimator)
     source = {
         "log": opened.name, "rate_hz": choices.rate_hz, "from": choices.begin_s, "to": choices.end_s
     }  # fmt: skip
