@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from livebode.cli import terminal
-from livebode.cli.live_survey import is_live
+from livebode.cli.live_survey import heard, is_live
 from livebode.cli.next_step import NextCommand
 from livebode.cli.shell import command_line
 from livebode.core import LivebodeError, OutputError, RecordingError, SourceError, UsageError, write_whole, writing
@@ -100,18 +100,18 @@ def write_configuration(
 
 def _heard(url: str, rate: float | None) -> tuple[Recorded, dict[str, Any]]:
     """What came from a live source, and its section [source]."""
-    from livebode.sources.live import HeardSamples, survey
+    from livebode.sources.live import HeardSamples
 
-    heard = survey(url)
-    if heard.block is None:
+    found = heard(url)
+    if found.block is None:
         raise SourceError(
             "no-samples",
-            heard.trouble or "the channels have no samples in common",
+            found.trouble or "the channels have no samples in common",
             f"see what arrives: {command_line('livebode', 'inspect', url)}",
             address=url,
         ).at(url)
-    block = heard.block if rate is None else replace(heard.block, rate_hz=rate)
-    return HeardSamples(block, url), {**heard.source, "rate_hz": block.rate_hz}
+    block = found.block if rate is None else replace(found.block, rate_hz=rate)
+    return HeardSamples(block, url), {**found.source, "rate_hz": block.rate_hz}
 
 
 def _check_recording(place: Location) -> None:
