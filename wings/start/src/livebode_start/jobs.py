@@ -247,7 +247,7 @@ def main_sentence(lines: list[str], *, failed: bool) -> str:
     >>> main_sentence(["report.html", "report.pdf", "Next: livebode view …"], failed=False)
     'report.pdf'
     """
-    filled = [line for line in lines if line.strip()]
+    filled = [line for line in lines if line.strip() and not line.startswith("Next: ")]  # that is for a terminal
     if failed:
         starts = [number for number, line in enumerate(filled) if line.startswith("livebode: ")]
         if starts:

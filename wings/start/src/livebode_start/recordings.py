@@ -251,7 +251,7 @@ def _found(opened: OpenedRecording, choices: Choices) -> ProposedConfiguration:
     estimator, reason = suitable_estimator(log, signals)
     estimator = choices.estimator or estimator
     average = "schedule" not in signals and not choices.baseline if choices.average is None else choices.average
-    model = choices.model or suitable_model(log, signals)
+    model = choices.model or suitable_model(opened.proposals, signals, estimator)
     source = {**opened.source, "from": choices.begin_s, "to": choices.end_s}
     tables = tables_of(source, signals, estimator=estimator, average=average, model=model)
     if choices.lines is not None:
