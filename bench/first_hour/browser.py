@@ -142,7 +142,7 @@ def worse_in_motion(person: Person) -> str:
         person.page.select_option("#baseline", index=1)
 
     text = measured(person, "today.parquet", compare)
-    assert "stiffness" in text, text
+    assert "belt 2.0 % softer" in text, text
     return text
 
 
