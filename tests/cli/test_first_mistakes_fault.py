@@ -96,6 +96,12 @@ MISTAKES = [
     ("fit runs/nope", "there is no directory 'runs/nope'; Runs in runs: monday"),
     ("fit runs/mondy", "did you mean 'monday'?"),
     ("fit log.csv", "'log.csv' is a file, not the directory of a run"),
+    (
+        "inspect ads://192.168.0.5",
+        "An address has no keys: write them under [source] of axis.toml, with the channels under [signals] "
+        "(docs/how-to/live.md), and check the file by `livebode doctor axis.toml`",
+    ),
+    ("inspect mqtt://user:secret@broker/axis --out new.toml --yes", "set source.username and source.password_env"),
     ("view nowhere/run", "there is no directory 'nowhere/run'"),
     ("view runs/mondy", "did you mean 'monday'?"),
     ("report directory", "has no run.json"),

@@ -11,6 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from livebode.core import Lines
+from livebode.excitation import multisine
 from livebode.interface import write_examples
 from livebode.plugins import named
 from tests.support.command import livebode, signals, write_csv
@@ -47,7 +49,28 @@ def test_in_motion_the_position_is_the_schedule_and_the_window_leaves_bins_witho
 
 
 def test_a_chirp_that_does_not_repeat_is_for_the_local_polynomial_method(folder: Path) -> None:
-    assert written(folder, "chirp.csv")["tracking"] == {"estimator": "lpm"}
+    found = written(folder, "chirp.csv")
+    assert found["tracking"] == {"estimator": "lpm"}
+    assert "fit" not in found
+
+
+@pytest.mark.parametrize(("lines", "unit", "model"), [
+    ("50,100,150,200", "rad/s", "auto"),
+    ("50,100,150,200", "", None),  # neither a velocity nor a position
+    ("50,100,200", "rad/s", None),  # six numbers for six parameters
+])  # fmt: skip
+def test_a_model_is_fitted_where_the_output_and_the_lines_permit_it_and_the_run_has_it(
+    tmp_path: Path, lines: str, unit: str, model: str | None
+) -> None:
+    period = multisine(Lines.parse(lines, 1000, 100))
+    w = np.resize(period, 3000)
+    y = 2 * np.concatenate([period[-1:], w[:-1]]) + 0.01 * np.random.default_rng(1).standard_normal(3000)
+    time = np.arange(3000) / 1000
+    write_csv(tmp_path / "log.csv", {"t": time, "w": w, "u": w, f"y [{unit}]" if unit else "z": y})
+    roles = ("--excitation", "w", "--input", "u", "--output", "y" if unit else "z")
+    assert written(tmp_path, "log.csv", *roles).get("fit", {}).get("model") == model
+    assert livebode("run", tmp_path / "axis.toml", "--out", tmp_path / "run").code == 0
+    assert written(tmp_path, "log.csv", *roles, "--fit", "none").get("fit") is None
 
 
 def test_without_units_names_or_the_samples_suffice(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Hides what Windows does not have: `python -m tests.support.windows_like FOLDER` then records, resumes and reports.
+"""Hides what Windows does not have: `python -m tests.support.windows_like TASK …` then does a task.
 
 `msvcrt` is a stand-in on flock: as there, a lock belongs to an open file, and ends with the process.
 """
@@ -7,15 +7,25 @@ from __future__ import annotations
 
 import errno
 import fcntl
+import importlib
 import os
+import pkgutil
+import select
+import selectors
 import shutil
 import signal
+import socket
 import subprocess  # which, like asyncio, takes the stand-in for Windows if it is imported later
 import sys
 import time
+import traceback
 import types
+from pathlib import Path
+from typing import Any
 
 assert subprocess
+assert selectors
+WINGS = Path(__file__).parents[2] / "wings"
 MODULES = ("fcntl", "resource", "pwd", "grp", "termios", "tty", "pty", "syslog", "readline", "posix_ipc", "spwd")
 OF_OS = (
     "fork", "forkpty", "getuid", "geteuid", "getgid", "getegid", "setuid", "chown", "lchown", "fchown", "fchmod",
@@ -23,7 +33,17 @@ OF_OS = (
     "fdatasync", "posix_fallocate", "posix_fadvise", "sched_getaffinity", "getloadavg", "sync", "writev",
     "O_NOFOLLOW", "O_NONBLOCK", "O_CLOEXEC", "O_DIRECTORY", "O_SYNC", "O_DSYNC",
 )  # fmt: skip
-OF_SIGNAL = ("SIGHUP", "SIGUSR1", "SIGUSR2", "SIGALRM", "SIGPIPE", "setitimer", "pthread_sigmask", "sigwait")
+OF_SIGNAL = (
+    "SIGHUP",
+    "SIGUSR1",
+    "SIGUSR2",
+    "SIGALRM",
+    "SIGPIPE",
+    "setitimer",
+    "pthread_sigmask",
+    "sigwait",
+    "pthread_kill",
+)
 OF_TIME = ("clock_gettime", "clock_getres", "CLOCK_BOOTTIME", "CLOCK_MONOTONIC", "pthread_getcpuclockid", "tzset")
 
 
@@ -55,12 +75,59 @@ def hide() -> None:
         return opened(path, flags, mode, dir_fd=dir_fd)
 
     os.open = open_file
+    _hide_polling()
+
+
+def _hide_polling() -> None:
+    """`select` waits for sockets only."""
+    chosen = select.select
+
+    def of_sockets(*waits: Any) -> Any:
+        if any(not isinstance(file, socket.socket) for files in waits[:3] for file in files):
+            raise OSError(10038, "an operation was attempted on something that is not a socket")
+        return chosen(*waits)
+
+    select.select = of_sockets
+    for name in ("poll", "epoll", "POLLRDHUP"):
+        delattr(select, name)
+
+
+def import_all() -> None:
+    """Import every module of livebode and its wings."""
+    import livebode
+
+    packages = [livebode, *(importlib.import_module(path.name) for path in sorted(WINGS.glob("*/src/livebode_*")))]
+    for package in packages:
+        for module in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):
+            try:
+                importlib.import_module(module.name)
+            except livebode.ExtraError as error:  # a package that nobody needs to test this
+                print(error, file=sys.stderr)
+            except ImportError as error:
+                # Other packages are those for this system; psutil, for example, imports `resource` on Linux only.
+                if "site-packages" not in traceback.extract_tb(error.__traceback__)[-1].filename:
+                    raise
+                print(error, file=sys.stderr)
+            print(module.name)
+
+
+def job() -> None:
+    """A job of the start page, as its server starts one; ends when standard input is closed."""
+    from livebode_start.job_process import main
+
+    main()
+
+
+def run() -> None:
+    """The command line."""
+    from livebode.cli import main
+
+    main()
 
 
 def use() -> None:
     """What the page on Windows states."""
     import shlex
-    from pathlib import Path
 
     from livebode import Run
     from livebode.cli.app import app
@@ -91,5 +158,5 @@ def use() -> None:
 
 if __name__ == "__main__":
     hide()
-    os.chdir(sys.argv[1])
-    use()
+    task, sys.argv[1:] = sys.argv[1], sys.argv[2:]
+    {"use": use, "import": import_all, "job": job, "run": run}[task]()

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from livebode.cli import terminal
-from livebode.cli.live_survey import is_live
+from livebode.cli.live_survey import heard, is_live
 from livebode.cli.next_step import NextCommand
 from livebode.cli.shell import command_line
 from livebode.core import (
@@ -115,18 +115,18 @@ def write_configuration(
 
 def _heard(url: str, rate: float | None) -> tuple[Recorded, dict[str, Any]]:
     """What came from a live source, and its section [source]."""
-    from livebode.sources.live import HeardSamples, survey
+    from livebode.sources.live import HeardSamples
 
-    heard = survey(url)
-    if heard.block is None:
+    found = heard(url)
+    if found.block is None:
         raise SourceError(
             "no-samples",
-            heard.trouble or "the channels have no samples in common",
-            "compare it with what livebode reads (docs/how-to/live.md), and correct the address or the sender",
+            found.trouble or "the channels have no samples in common",
+            "docs/how-to/live.md describes what is read; correct the address or the sender",
             address=url,
         ).at(url)
-    block = heard.block if rate is None else replace(heard.block, rate_hz=rate)
-    return HeardSamples(block, url), {**heard.source, "rate_hz": block.rate_hz}
+    block = found.block if rate is None else replace(found.block, rate_hz=rate)
+    return HeardSamples(block, url), {**found.source, "rate_hz": block.rate_hz}
 
 
 def _check_recording(place: Location) -> None:
@@ -251,7 +251,7 @@ class Dialog:
             still = "schedule" not in signals
             answers["average"] = _agrees(console, "Average over all periods, for a standstill", still)
         if "fit" not in answers:
-            suits = suitable_model(self._proposals.log, signals)
+            suits = suitable_model(self._proposals, signals, answers["estimator"])
             answers["fit"] = _ask(console, "Model to fit to the responses", suits, ("none", "auto", *named("models")))
         estimator, average, model = (answers[key] for key in ("estimator", "average", "fit"))
         return tables_of(source, signals, estimator=estimator, average=average, model=model)

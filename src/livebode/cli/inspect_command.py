@@ -61,7 +61,11 @@ def inspect_command(
     ] = None,
     fit: Annotated[
         str | None,
-        typer.Option(metavar="MODEL", help="For --out: model to fit: auto, two-mass, …; or none. \\[default: none]"),
+        typer.Option(
+            metavar="MODEL",
+            help="For --out: model to fit: auto, two-mass, …; or none. \\[default: auto for a velocity or position "
+            "with a periodic excitation]",
+        ),
     ] = None,
     yes: Annotated[bool, typer.Option("--yes", help="For --out: accept every proposal without asking.")] = False,
     force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,

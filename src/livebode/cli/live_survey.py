@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from livebode.cli import terminal
+from livebode.core import LivebodeError
 
 if TYPE_CHECKING:
     from livebode.sources.live import Survey
@@ -17,19 +18,36 @@ def is_live(text: str) -> bool:
     return text.partition(":")[0] in named("sources") and ":" in text
 
 
+_NEEDS_KEYS = "config.key-missing", "config.secret-in-url", "source.refused"
+
+
+def heard(url: str) -> Survey:
+    """What comes from an address within some seconds; the error of one that needs keys says where to write them."""
+    from livebode.sources.live import survey
+
+    try:
+        return survey(url)
+    except LivebodeError as error:
+        if error.code in _NEEDS_KEYS:
+            error.remedy += (
+                ". An address has no keys: write them under [source] of axis.toml, with the channels under [signals] "
+                "(docs/how-to/live.md), and check the file by `livebode doctor axis.toml`"
+            )
+        raise
+
+
 def show_survey(url: str, *, as_json: bool) -> None:
     """Listen to an address, and print its channels."""
     from dataclasses import asdict
 
     from livebode.records import to_json
-    from livebode.sources.live import survey
 
-    heard = survey(url)
+    found = heard(url)
     if as_json:
-        channels = [asdict(channel) for channel in heard.channels]
-        print(to_json({"source": heard.source, "channels": channels, "trouble": heard.trouble or None}))
+        channels = [asdict(channel) for channel in found.channels]
+        print(to_json({"source": found.source, "channels": channels, "trouble": found.trouble or None}))
         return
-    list_channels(heard)
+    list_channels(found)
 
 
 def list_channels(heard: Survey) -> None:

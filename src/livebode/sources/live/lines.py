@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 import select
 import sys
+from queue import Empty, Queue
+from threading import Thread
 from typing import ClassVar
 
 from livebode.core import LivebodeError
@@ -30,10 +32,10 @@ class StdinSource(LiveSource):
         decoder, splitter = message_decoder(self.settings), LineSplitter()
         number = sys.stdin.fileno()
         self._established()
+        pieces = _Pieces(number)
         while not self._stop.is_set():
-            if not select.select([number], [], [], TICK_S)[0]:
+            if (piece := pieces.next()) is None:
                 continue
-            piece = os.read(number, _PIECE_BYTES)
             for line in splitter.feed(piece):
                 self._decode(decoder, line)
             if splitter.cut:
@@ -50,6 +52,36 @@ class StdinSource(LiveSource):
             self._malformed(error, line)
             return
         self._deliver(batch)
+
+
+class _Pieces:
+    """What comes from a pipe; a thread waits for it where `select` knows sockets only, as on Windows."""
+
+    def __init__(self, number: int) -> None:
+        self._number = number
+        self._read: Queue[bytes] | None = None
+        try:
+            select.select([number], [], [], 0)
+        except OSError:
+            self._read = Queue(1)
+            Thread(target=self._wait, name="livebode-stdin", daemon=True).start()
+
+    def next(self) -> bytes | None:
+        """The next bytes, none at the end; None if nothing has come for a while."""
+        if self._read is None:
+            ready = select.select([self._number], [], [], TICK_S)[0]
+            return os.read(self._number, _PIECE_BYTES) if ready else None
+        try:
+            return self._read.get(timeout=TICK_S)
+        except Empty:
+            return None
+
+    def _wait(self) -> None:
+        assert self._read is not None
+        piece = b" "
+        while piece:
+            piece = os.read(self._number, _PIECE_BYTES)
+            self._read.put(piece)
 
 
 class LineSplitter:
