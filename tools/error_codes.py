@@ -16,12 +16,12 @@ On the command line an error is one line on standard error, and the exit code is
 would be again. The exit code is 75 (`EX_TEMPFAIL`) where the same request may succeed later: for the codes marked with
 an asterisk, and for any error whose fact `errno` is that of a full or failing disk, of a resource that others use now,
 or of a network or device that does not answer. `temporary` is this as an attribute. The line names the options of the
-command that it is about. With `--json` the last line on standard error is an object instead, with these options as a
-fact:
+command that it is about. With `--json` the last line on standard error is an object instead, with these options, or
+what else the sentence is about, as facts:
 
-    $ livebode run standstill.csv --json
-    {"error": {"code": "usage.missing", "place": "", "message": "the output channel is not named", "remedy": "...",
-    "facts": {"argument": "output", "options": ["--output"]}}}
+    $ livebode run standstill.csv --output speed --json
+    {"error": {"code": "recording.channel-unknown", "place": "standstill.csv", "message": "there is no channel 'speed'",
+    "remedy": "Channels: t, w, u, velocity", "facts": {"channel": "speed", "channels": ["t", "w", "u", "velocity"]}}}
 
 Two codes have no class: `internal` is an internal error (exit code 1, its traceback is a fact), and `stopped`, in the
 list of several axes, an axis that somebody ended.

@@ -16,6 +16,7 @@ from livebode.excitation import multisine
 from livebode.interface import write_examples
 from livebode.plugins import named
 from tests.support.command import livebode, signals, write_csv
+from tests.support.drive_exports import EXPORTS, TRUTH
 from tests.support.terminals import on_terminal
 
 
@@ -185,14 +186,47 @@ def test_a_recording_without_time_and_names_is_asked_for_its_rate_and_proposes_a
     )))})  # fmt: skip
     out = tmp_path / "axis.toml"
     answers = [("Rate", "-5"), ("not a positive number", "1000"), *((word, "") for word in (
-        "Excitation", "Input", "Output", "Schedule", "Estimator", "Average", "Model",
+        "Excitation", "Input", "Output", "Schedule", "value 1 of", "value 1 of", "Estimator", "Average", "Model",
     ))]  # fmt: skip
     code, text = on_terminal("inspect", tmp_path / "log.csv", "--out", out, columns=160, kind="dumb", answers=answers)
     assert code == 0, text
     table = tomllib.loads(out.read_text("utf-8"))
     assert table["signals"] == {"excitation": "Ch2", "input": "Ch3", "output": "Ch1"}
     assert table["source"]["rate_hz"] == 1000.0
+    assert "units" not in table["source"]
     assert livebode("run", out, "--out", tmp_path / "run").code == 0
+
+
+@pytest.mark.parametrize(
+    ("name", "question", "answer", "scale"),
+    [
+        ("% of the rated torque", "What is 1 % of Actual torque, such as 0.024 N m", "0.024 N m", 1),
+        ("torque constant", "What is 1 A of iq_A, such as 0.35 N m", "0.35 N m", 1),
+        ("without units", "What is the value 1 of b, such as 0.024 N m", "mNm", 1),
+        ("% of the rated torque", "What is 1 % of Actual torque, such as 0.024 N m", "0.048 N m", 2),
+    ],
+)
+def test_what_one_unit_of_a_channel_is_gives_the_parameters_of_the_machine(
+    name: str, question: str, answer: str, scale: float, tmp_path: Path
+) -> None:
+    export, out = EXPORTS[name], tmp_path / "axis.toml"
+    export.write(tmp_path / "log.csv")
+    excitation, torque, output = export.names
+    units = [("the value 1 of c, such as 1 rpm", "rad/s")] * (name == "without units")
+    answers = [
+        ("Schedule", "-"), (question, "3 %"), ("not a number of a unit", answer), *units,
+        ("Estimator", ""), ("Average", ""), ("Model", "two-mass"),
+    ]  # fmt: skip
+    code, text = on_terminal(
+        "inspect", tmp_path / "log.csv", "--out", out, "--excitation", excitation, "--input", torque,
+        "--output", output, columns=160, kind="dumb", answers=answers,
+    )  # fmt: skip
+    assert code == 0, text
+    assert tomllib.loads(out.read_text("utf-8"))["source"]["units"][torque] == answer
+    done = livebode("run", out, "--out", tmp_path / "run")
+    assert done.code == 0, done.err
+    found = json.loads(livebode("fit", tmp_path / "run", "--json").out)["quantities"]
+    assert found["Keff"]["value"] == pytest.approx(scale * TRUTH["Keff"], rel=2e-3)
 
 
 def test_the_models_of_plugins_are_offered_too(folder: Path) -> None:

@@ -64,6 +64,39 @@ def test_a_run_with_a_fit_leads_to_its_report_and_a_run_of_modes_to_the_page(tmp
         assert last == f"Next: {shlex.join(['livebode', following, str(out)])}"
 
 
+def test_the_next_command_has_the_rate_that_the_recording_lacks(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    columns = {name: values for name, values in signals().items() if name != "t"}
+    rows = [",".join(columns), *(",".join(f"{value:.9g}" for value in row) for row in zip(*columns.values()))]
+    Path("plain.csv").write_text("\n".join(rows))
+    first = livebode("inspect", "plain.csv", "--rate", "1000")
+    command = shlex.split(first.out.splitlines()[-1].removeprefix("Next: livebode "))
+    assert livebode(*command, "--yes").code == 0
+
+
+def test_where_a_run_is_needed_a_file_is_answered_with_the_command_that_works(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    write_examples(["standstill"], tmp_path)
+    refused = livebode("fit", "standstill.toml")
+    assert refused.err.count("livebode run standstill.toml") == 1
+    ran = livebode("run", "standstill.toml")
+    assert "newest fit" not in ran.out  # of an average there is one fit
+    assert "rejected: no response" not in ran.out
+    assert livebode("fit", "runs/standstill").code == 0
+    assert "livebode view runs/standstill" in livebode("run", "runs/standstill").err
+
+
+def test_a_hop_beyond_the_recording_is_a_sentence_and_no_run_without_responses(tmp_path: Path) -> None:
+    write_csv(tmp_path / "log.csv", signals())
+    result = livebode("run", tmp_path / "log.csv", "--hop", "10000000", "--out", tmp_path / "run")
+    assert (result.code, (tmp_path / "run").exists()) == (2, False)
+    assert "less than the hop of 10000000; choose a shorter hop" in result.err
+
+
 @pytest.mark.parametrize(
     ("examples", "before", "command", "proposed"),
     [

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import tomllib
 from pathlib import Path
 
 import pytest
 
-from livebode.configuration import parse_table
+from livebode.configuration import Axis, parse_table
 from livebode.core import ConfigError
 from tests.support.command import livebode
 
@@ -29,6 +30,12 @@ MISTAKES = [
     ("; the motor", "# the motor"),
     ("// the motor", "# the motor"),
     ("[signals", "[signals]"),
+    ("[signals  # of the drive", "[signals]  # of the drive"),
+    ('output = "velocity  # of the motor', 'output = "velocity"  # of the motor'),
+    ("output = 'velocity  # of the motor", "output = 'velocity'  # of the motor"),
+    ("window = 4,000  # samples", "window = 4000  # samples"),
+    ("average = yes", "average = true"),
+    ("average = Off  # all", "average = false  # all"),
 ]  # fmt: skip
 
 
@@ -43,6 +50,48 @@ def test_the_line_that_was_meant_is_given_and_works(wrong: str, meant: str, end:
     assert f"in line 4: {wrong}" in error.message
     assert error.remedy.startswith(f"write {meant}")
     parse_table(text.replace(wrong, meant).encode(), "axis.toml")
+
+
+def test_a_comma_that_may_be_a_decimal_one_has_both_readings() -> None:
+    with pytest.raises(ConfigError) as caught:
+        parse_table(b"[lines]\nwindow = 1,125\n", "axis.toml")
+    assert caught.value.remedy == "write window = 1125, or window = 1.125 if the comma is a decimal one"
+
+
+@pytest.mark.parametrize(
+    "text", ["[lines]\nwindow = 400\nwindow = 200\n", "[lines]\nwindow = 400\n[fit]\n[lines]\n", "a = 1\na.b = 2\n"]
+)
+def test_what_is_in_the_file_twice_is_named_with_its_line(text: str) -> None:
+    with pytest.raises(ConfigError) as caught:
+        parse_table(text.encode(), "axis.toml")
+    last = text.splitlines()[-1]
+    assert f"in line {text.count(chr(10))}: {last}" in caught.value.message
+    assert caught.value.remedy.startswith("it is in the file twice; remove one")
+    parse_table(text.removesuffix(f"{last}\n").encode(), "axis.toml")
+
+
+@pytest.mark.parametrize(
+    ("section", "wrong", "meant"),
+    [
+        ("lines", 'window = "400"', "400"),
+        ("lines", "window = 400.0", "400"),
+        ("lines", "frequencies = [20, 40]", '"20,40"'),
+        ("tracking", 'average = "yes"', "true"),
+        ("tracking", 'forgetting = "0,8"', "0.8"),
+    ],
+)
+def test_a_value_of_the_wrong_type_is_given_as_it_is_written(section: str, wrong: str, meant: str) -> None:
+    tables = {"source": {"log": "y.csv"}, "signals": {"output": "y", "input": "u"}, "lines": {}, "tracking": {}}
+    with pytest.raises(ConfigError) as caught:
+        Axis.of(tables | tomllib.loads(f"[{section}]\n{wrong}\n"), "axis.toml")
+    assert caught.value.remedy == f"write {meant}"
+    Axis.of(tables | tomllib.loads(f"[{section}]\n{wrong.partition('=')[0]} = {meant}\n"), "axis.toml")
+
+
+def test_a_key_below_the_wrong_header_is_given_its_own() -> None:
+    with pytest.raises(ConfigError) as caught:
+        Axis.of({"source": {"log": "y.csv", "excitation": "w"}, "signals": {"output": "y", "input": "u"}}, "axis.toml")
+    assert caught.value.remedy == "it belongs to [signals]: write it below that header"
 
 
 @pytest.mark.parametrize(

@@ -180,6 +180,24 @@ def test_margins_within_the_band_are_marked_on_magnitude_and_phase(tab: Tab) -> 
     assert phase["words"] == "phase margin 45.0 ± 3.9°, delay margin 4.17 ± 0.20 ms"
 
 
+@pytest.mark.parametrize("half", [5e-5, 0.0021, 0.04, 0.7, 9.0])
+def test_a_bound_of_any_size_is_shown_with_two_digits_and_never_as_zero(tab: Tab, half: float) -> None:
+    decibels, absolute, degrees, none = tab.page.evaluate(
+        """async (half) => {
+          const { angle, bounds, halfAngle } = await import("/static/values.js");
+          const both = [false, true].map((absolute) => bounds(20 - half, 20, 20 + half, { absolute }));
+          return [...both, halfAngle(half), angle(-1e-6)];
+        }""",
+        half,
+    )
+    low, high = (float(text.split()[0].lstrip("+−")) for text in decibels.split(" … "))
+    assert [low, high] == pytest.approx([half, half], rel=0.05)
+    low, high = (float(text) for text in absolute.split(" … "))
+    assert high - low == pytest.approx(10 ** (1 + half / 20) - 10 ** (1 - half / 20), rel=0.2)
+    assert float(degrees.strip("± °")) == pytest.approx(half, rel=0.05)
+    assert none == "+0.0°"
+
+
 def test_cursors_show_differences(tab: Tab, run: Path) -> None:
     one = newest(run)
     over = tab.page.locator("#magnitude .u-over")

@@ -49,8 +49,8 @@ def frames(rate_hz: float, names: str = "wuy") -> Iterator[bytes]:
 
 FOREIGN = f"""
 [source.fields]
-w = "{FIELDS["inject"]}"
-u = "{FIELDS["actual"]}"
+w = "{FIELDS["torque_inject"]}"
+u = "{FIELDS["torque_actual"]}"
 y = "{FIELDS["vel"]}"
 """
 

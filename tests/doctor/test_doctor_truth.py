@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import re
@@ -109,6 +110,16 @@ def test_a_port_of_the_dashboard_that_is_taken_fails_where_the_configuration_ser
         assert checks["dashboard port"]["verdict"] == "failed"
         assert str(port) in checks["dashboard port"]["message"]
     assert doctor(path)[1]["dashboard port"]["verdict"] == "ok"
+
+
+def test_the_usual_port_that_is_taken_is_a_warning_where_the_configuration_does_not_serve(tmp_path: Path) -> None:
+    write_parquet(tmp_path / "log.parquet", signals(100))
+    path = axis(tmp_path, 'log = "log.parquet"', ONE_LINE_DIRECT)
+    with contextlib.ExitStack() as stack:
+        with contextlib.suppress(OSError):  # another program may have it already
+            stack.enter_context(socket.create_server(("127.0.0.1", 8765)))
+        code, checks = doctor(path)
+    assert (code, checks["dashboard port"]["verdict"]) == (0, "warning")
 
 
 @pytest.mark.parametrize(

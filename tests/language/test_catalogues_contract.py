@@ -58,6 +58,15 @@ def test_a_translation_has_the_values_of_the_sentence_and_all_plural_forms(code:
 
 
 @pytest.mark.parametrize("code", LANGUAGES)
+def test_a_translation_has_no_blank_at_its_ends_that_the_sentence_has_not(code: str) -> None:
+    """What is cut off at an end often leaves a blank; the sentence has none there."""
+    for message in (message for message in catalogues()[code] if message.id):
+        english = [message.id] if isinstance(message.id, str) else list(message.id)
+        for text in [message.string] if isinstance(message.id, str) else list(message.string):
+            assert (text == text.strip()) or english[0] != english[0].strip(), (english[0], text)
+
+
+@pytest.mark.parametrize("code", LANGUAGES)
 def test_the_files_are_those_that_make_catalogues_writes(code: str) -> None:
     new = updated(catalogues()[code])
     assert (FOLDER / f"{code}.po").read_bytes() == po_text(new)

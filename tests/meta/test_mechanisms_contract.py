@@ -30,7 +30,8 @@ SOURCES = (ROOT / "src/livebode", *ROOT.glob("wings/*/src"))
                 "livebode_plant/cli/fleet/run_command.py",
             },
         ),
-        (r"\bfsync\(", {"core/files.py", "doctor/computer.py"}),
+        # An upload is synced where it is received, and not in the thread that serves the pages.
+        (r"\bfsync\(", {"core/files.py", "doctor/computer.py", "livebode_start/uploads.py"}),
         # A record that is paused at its end raises without an error of the system.
         (r'"not-written",\n', {"records/segments/store.py"}),
         (r'"not-written", ', {"core/write_errors.py"}),

@@ -127,7 +127,7 @@ def test_inspect_names_the_stretches_that_a_run_takes(tmp_path: Path) -> None:
     assert [stretch["stop"] for stretch in found["stretches"]] == edges[1:]
     assert [edges[i] for i in (0, 1, 3, 4, 7, 8)] == [0, 530, 530 + 6 * 200, 530 + 7 * 200, 530 + 40 * 400, 17060]
     table = livebode(*arguments).out
-    assert "outlying     1730 … 1929  0.4325 … 0.4825        6  leaves it out" in table
+    assert "outlying     1730 … 1929  0.4325 … 0.4825        6  excludes it" in table
 
 
 @pytest.mark.parametrize(

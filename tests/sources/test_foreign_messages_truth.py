@@ -55,7 +55,7 @@ def test_the_fields_are_listed_and_the_configuration_of_them_is_that_of_the_mach
     assert result.code == 0, result.err
     table = tomllib.loads(out.read_text())
     assert table["source"] == {"url": url, "rate_hz": 1000.0, "sample_field": "n", "fields": FIELDS}
-    assert table["signals"] == {"excitation": "inject", "input": "actual", "output": "vel"}
+    assert table["signals"] == {"excitation": "torque_inject", "input": "torque_actual", "output": "vel"}
     assert table["lines"] == {"frequencies": "50, 100, 200", "window": 20}
 
 
@@ -117,3 +117,24 @@ def test_a_silent_port_is_one_sentence() -> None:
     assert result.code != 0
     assert result.err.count("\n") == 1
     assert "no samples arrived within 3 s (nothing was received)" in result.err
+
+
+def test_of_messages_that_cannot_be_used_no_remedy_is_what_was_just_tried(tmp_path: Path) -> None:
+    port = free_port()
+    url = f"udp://127.0.0.1:{port}"
+    with udp_sender(port, repeat(b"12.5;13.5;rpm")):
+        listed = livebode("inspect", url, "--out", tmp_path / "mine.toml", "--yes")
+        with pytest.raises(SourceError) as caught, open_source(SourceSettings(url=url, timeout_s=1.0)):
+            pass
+    assert caught.value.remedy == "compare the sender with [source]"
+    assert (listed.code, listed.err.count(url)) == (75, 1)
+    assert "the newest has 13 bytes and begins with b'12.5;13.5;rpm'" in listed.err
+    for wrong in ("livebode inspect", "machine is on", "Error"):
+        assert wrong not in listed.err
+
+
+def test_a_recording_is_not_at_the_address_of_a_live_source_and_the_sentence_says_where_it_begins() -> None:
+    result = livebode("run", "mqtt://127.0.0.1/hall/press3", "--output", "y")
+    assert "it is a live source: write its configuration by livebode inspect mqtt://127.0.0.1/hall/press3 --out" in (
+        result.err
+    )

@@ -15,7 +15,7 @@ from tests.support.command import signals
 
 SAMPLES = 10
 PERIOD_S = SAMPLES / 1000.0
-FIELDS = {"inject": "drive.torque.inject", "actual": "drive.torque.actual", "vel": "axes[0].vel"}
+FIELDS = {"torque_inject": "drive.torque.inject", "torque_actual": "drive.torque.actual", "vel": "axes[0].vel"}
 
 
 def messages(start: int = 0) -> Iterator[bytes]:

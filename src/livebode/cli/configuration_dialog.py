@@ -14,13 +14,23 @@ from livebode.cli import terminal
 from livebode.cli.live_survey import heard, is_live
 from livebode.cli.next_step import NextCommand
 from livebode.cli.shell import command_line
-from livebode.core import LivebodeError, OutputError, RecordingError, SourceError, UsageError, write_whole, writing
+from livebode.core import (
+    LivebodeError,
+    OutputError,
+    RecordingError,
+    SourceError,
+    UsageError,
+    read_quantity,
+    read_unit,
+    write_whole,
+    writing,
+)
 from livebode.locations import Location, Url, local_copy, location
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from livebode.preparation import Guess, Proposals, Recorded, Settled
+    from livebode.preparation import ChannelSummary, Guess, Proposals, Recorded, Settled
     from livebode.sources import Log
 
 _NONE = "-"
@@ -30,6 +40,11 @@ _QUESTIONS = {
     "output": "Output of the plant, such as the velocity",
     "schedule": "Schedule, what the response depends on, such as the position",
 }
+_EXAMPLES = {
+    "torque": "0.024 N m", "current": "0.35 N m", "force": "12 N", "position": "1/131072 rev", "velocity": "1 rpm",
+    "acceleration": "9.81 m/s²",
+}  # fmt: skip
+"""What one unit of a channel may be, by its kind: 1 % of a rated torque, 1 A by the torque constant, 1 count."""
 _ESTIMATORS = ("joint", "direct", "lpm", "welch")
 _CONCERNS = {"tracking.estimator": "estimator", "fit.model": "fit", "model": "fit"}
 _WITHOUT_RATE = "recording.rate-missing"
@@ -107,7 +122,7 @@ def _heard(url: str, rate: float | None) -> tuple[Recorded, dict[str, Any]]:
         raise SourceError(
             "no-samples",
             found.trouble or "the channels have no samples in common",
-            f"see what arrives: {command_line('livebode', 'inspect', url)}",
+            "compare it with what livebode reads (docs/how-to/live.md), and correct the address or the sender",
             address=url,
         ).at(url)
     block = found.block if rate is None else replace(found.block, rate_hz=rate)
@@ -159,6 +174,7 @@ class Dialog:
         self._proposals, self._console = proposals, console
         self._given, self._answers = given, dict(given)
         self._reasons = dict.fromkeys(_QUESTIONS, "as specified")
+        self._units: dict[str, str] = {}  # of each channel that was asked for; empty: not known
 
     def settled(self, source: Mapping[str, Any]) -> Settled:
         """The checked configuration of all answers with this section [source].
@@ -173,7 +189,9 @@ class Dialog:
         while True:
             try:
                 signals, reasons = self._signals()
-                return settled(self._proposals.log, self._tables(source, signals), reasons)
+                units = self._source_units(signals)
+                given = {**source, "units": units} if units else source
+                return settled(self._proposals.log, self._tables(given, signals), reasons)
             except LivebodeError as error:
                 wrong = [key for key in _concerned(error, self._answers) if key not in self._given]
                 if self._console is None or not wrong:
@@ -200,6 +218,27 @@ class Dialog:
         _check_signals(signals, names, str(self._proposals.log.path))
         return signals, {role: self._reasons[role] for role in signals}
 
+    def _source_units(self, signals: Mapping[str, str]) -> dict[str, str]:
+        """What one unit of the input and of the output is, where the recording does not say it in SI units."""
+        used = {signals[role]: role for role in ("input", "output")}
+        for channel in self._proposals.channels if self._console is not None else ():
+            if channel.name in used and channel.name not in self._units:
+                asked = not read_unit(channel.unit).si or channel.kind == "current"
+                self._units[channel.name] = self._unit_of(channel, used[channel.name]) if asked else ""
+        return {name: unit for name in used if (unit := self._units.get(name, ""))}
+
+    def _unit_of(self, channel: ChannelSummary, role: str) -> str:
+        assert self._console is not None
+        kind = channel.kind if channel.kind in _EXAMPLES else {"input": "torque", "output": "velocity"}[role]
+        example = _EXAMPLES[kind]
+        one = f"1 {channel.unit}" if channel.unit else "the value 1"
+        question = f"What is {one} of {channel.name}, such as {example}"
+        while answer := _line(self._console, f"{question} (Enter: not known)"):
+            if read_quantity(answer).si:
+                return answer
+            self._console.print(f"{answer!r} is not a number of a unit that is recognised; write it as {example}")
+        return ""
+
     def _tables(self, source: Mapping[str, Any], signals: dict[str, str]) -> dict[str, dict[str, Any]]:
         from livebode.plugins import named
         from livebode.preparation import suitable_estimator, suitable_model, tables_of
@@ -212,7 +251,7 @@ class Dialog:
             still = "schedule" not in signals
             answers["average"] = _agrees(console, "Average over all periods, for a standstill", still)
         if "fit" not in answers:
-            suits = suitable_model(self._proposals, signals, answers["estimator"])
+            suits = suitable_model(self._proposals.log, signals, answers["estimator"])
             answers["fit"] = _ask(console, "Model to fit to the responses", suits, ("none", "auto", *named("models")))
         estimator, average, model = (answers[key] for key in ("estimator", "average", "fit"))
         return tables_of(source, signals, estimator=estimator, average=average, model=model)
@@ -282,11 +321,12 @@ def _check_signals(signals: Mapping[str, str], names: Sequence[str], path: str) 
             argument="output",
         )
     alone = command_line("livebode", "run", path, "--output-only", "--output", signals["output"])
+    modes = f"the modes are found by {alone}"
     if not {"excitation", "input"} & set(signals):
         raise UsageError(
             "missing",
             f"neither an excitation nor an input is recognised among {', '.join(names)}",
-            f"give --excitation and --input; of an output alone the modes are found by {alone}",
+            "give --excitation and --input" + ("" if is_live(path) else f"; of an output alone {modes}"),
             options=["--excitation", "--input"],
         )
     if "input" not in signals:
@@ -307,6 +347,15 @@ def _ask(console: Console | None, question: str, default: str, choices: tuple[st
 
     with _ended_input():
         return Prompt.ask(Text(question), console=console, choices=list(choices), show_choices=shown, default=default)
+
+
+def _line(console: Console, question: str) -> str:
+    """A line of text, which may be empty."""
+    from rich.prompt import Prompt
+    from rich.text import Text
+
+    with _ended_input():
+        return Prompt.ask(Text(question), console=console, default="", show_default=False).strip()
 
 
 def _agrees(console: Console | None, question: str, default: bool) -> bool:

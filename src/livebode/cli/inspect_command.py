@@ -133,7 +133,7 @@ def inspect_command(
         console.print(f"The excitation is not recognised: {found.unrecognised}", soft_wrap=True)
     if found.estimator:
         console.print(f"estimator of a run: --estimator {found.estimator} ({_SUITS[found.estimator]})", soft_wrap=True)
-    return NextCommand("inspect", log, "--out", "axis.toml")
+    return NextCommand("inspect", log, "--out", "axis.toml", rate=rate, time=time, dbc=dbc)
 
 
 def _check(
@@ -271,7 +271,7 @@ def _show_stretches(found: Inspection, console: Console) -> None:
         first, stop = (f"{log.origin_s + sample / log.rate_hz:.6g}" for sample in (stretch.first, stretch.stop))
         periods = "" if stretch.periods is None else " … ".join(map(str, sorted(set(stretch.periods))))
         samples = f"{stretch.first} … {stretch.stop - 1}"
-        taken = "takes it" if stretch.taken else "leaves it out"
+        taken = "uses it" if stretch.taken else "excludes it"
         table.add_row(stretch.kind, samples, f"{first} … {stop}", periods, taken)
     console.print(table)
     if (more := len(shown) - _STRETCHES_SHOWN) > 0:
@@ -310,9 +310,12 @@ def _show_excitation(found: Inspection, console: Console) -> None:
         f"{counted(len(lines), 'line')} ({pattern(lines.bins)}), "
         f"{lines.frequency_hz[0]:.6g} … {lines.frequency_hz[-1]:.6g} Hz"
     )
-    hops = ((default_hop(excitation.period), "a run"), (found.live_hop, "live"))
-    each = "; ".join(f"{who} {lines.rate_hz / hop:.4g} (hop {hop})" for hop, who in hops)
-    console.print(f"responses/s by default, with this period as window: {each}", soft_wrap=True)
+    hop, live = default_hop(excitation.period), found.live_hop
+    console.print(
+        f"with this period as window, a run has {lines.rate_hz / hop:.4g} responses per second (hop {hop}) by default, "
+        f"a live run {lines.rate_hz / live:.4g} (hop {live})",
+        soft_wrap=True,
+    )
     table = Table(box=None, header_style="bold")
     for heading in ("line Hz", "amplitude", "SNR at output dB"):
         table.add_column(heading, justify="right")

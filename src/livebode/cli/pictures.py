@@ -108,7 +108,8 @@ def show(outcome: Outcome) -> None:
         _show_statuses(outcome.summary["fit"])
     if outcome.fit is not None:
         with moments_by(RunClock.of(outcome.summary)):
-            show_fit(outcome.fit, f"newest fit, at {moment(outcome.fit.parameters.time_s[0], 2)}")
+            of = f"newest fit, at {moment(outcome.fit.parameters.time_s[0], 2)}"
+            show_fit(outcome.fit, of if outcome.average is None else "the average of all periods")
     if "loop" in outcome.summary:
         _show_loop(outcome.summary["loop"])
     if "monitoring" in outcome.summary:
@@ -117,6 +118,7 @@ def show(outcome: Outcome) -> None:
 
 
 _LINES_SHOWN = 20
+_NO_RESPONSE = "no response"  # status of a response without valid lines
 _REASONS = {
     "distorted": "distortion by friction, backlash or steps of a sensor",
     "hum": "hum of the mains",
@@ -193,7 +195,10 @@ def show_monitoring(found: dict[str, Any]) -> None:
 
 def _show_statuses(summary: dict[str, Any]) -> None:
     """Print the numbers of valid and rejected fits, with reasons."""
-    why = "".join(f"; {count} rejected: {word}" for word, count in summary["statuses"].items() if word != "ok")
+    others = {word: count for word, count in summary["statuses"].items() if word not in ("ok", _NO_RESPONSE)}
+    why = "".join(f"; {count} rejected: {word}" for word, count in others.items())
+    if (count := summary["statuses"].get(_NO_RESPONSE)) is not None:
+        why += f"; {counted(count, 'response')} not valid, so without a fit"
     print(f"\n{counted(summary['statuses'].get('ok', 0), 'fit')} of the {summary['model']} model valid{why}")
     if summary["unknown_gain"]:
         print(f"  {summary['unknown_gain']}")

@@ -39,7 +39,6 @@ from livebode.runtime import (
     StoppedError,
     Subscriber,
     TrackerResults,
-    next_run,
     run,
 )
 from livebode.sources import read_head
@@ -91,6 +90,8 @@ def run_targets(
     if out is not None:
         place = location(out)
     elif not force and (live or not segments):  # the record of a recording with a journal continues
+        from livebode.runtime import next_run  # needed without a given place only
+
         place = next_run(Path("runs") / target.stem, axes)
     with recorded_at(place, segments=segments) as (directory, send):
         if alone is None:

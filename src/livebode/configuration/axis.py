@@ -25,6 +25,7 @@ from livebode.configuration.ready import ReadyCondition, ready_condition
 from livebode.configuration.report_section import ReportSection, report_error
 from livebode.configuration.section import ConfigurationSection
 from livebode.configuration.toml_file import one_line, read_table, shortened
+from livebode.configuration.toml_mistakes import meant_value
 from livebode.core import ConfigError, nearest_name
 from livebode.estimates import MATRIX, RESPONSE, rule
 from livebode.sources import live
@@ -172,7 +173,9 @@ class Axis(ConfigurationSection):
 
     def beside(self, folder: Path) -> Axis:
         """The same with relative paths from `folder`."""
-        axis = self.model_copy(update={"source": self.source.beside(folder), "serve": self.serve.beside(folder)})
+        axis = self.model_copy(update={"source": self.source.beside(folder)})
+        if "serve" in self.model_fields_set:
+            axis = axis.model_copy(update={"serve": self.serve.beside(folder)})
         if self.publish:
             axis = axis.model_copy(update={"publish": [section.beside(folder) for section in self.publish]})
         if self.report is not None:
@@ -268,7 +271,9 @@ def _first_of(error: ValidationError) -> ConfigError:
     value = "its value" if secret else shortened(first["input"])
     why = first["msg"].removeprefix("Value error, ").lower()
     facts = {"key": place} | ({} if secret else {"value": value})
-    return ConfigError("value-invalid", f"{place} = {value} is not usable: {why}", "correct it", **facts)
+    meant = None if secret else meant_value(first["type"], first["input"])
+    remedy = "correct it" if meant is None else f"write {meant}"
+    return ConfigError("value-invalid", f"{place} = {value} is not usable: {why}", remedy, **facts)
 
 
 def _is_less_helpful(error: ErrorDetails) -> tuple[bool, bool]:
@@ -281,6 +286,9 @@ def nearest(loc: tuple[int | str, ...]) -> str:
     if loc[1:] and loc[-1] in Axis.model_fields:
         kind = _section_at((loc[-1],))
         return f"[{loc[-1]}] is a section of its own, with the settings {', '.join(_names(kind))}"
+    owners = [f"[{name}]" for name in Axis.model_fields if loc[1:] and loc[-1] in _names(_section_at((name,)))]
+    if owners:
+        return f"it belongs to {' or '.join(owners)}: write it below that header"
     return nearest_name(str(loc[-1]), _names(_section_at(loc[:-1])), "Settings")
 
 

@@ -5,12 +5,13 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, ValidationError, model_validator
 
 from livebode.configuration.section import ConfigurationSection, File, Language
 from livebode.configuration.toml_file import one_line, read_table, shortened
+from livebode.configuration.toml_mistakes import meant_value
 from livebode.core import ConfigError, Paper, nearest_name
 
 LIMITS_MAX = 50
@@ -95,6 +96,9 @@ class ReportSection(ConfigurationSection):
         Language of the report. `--language` overrides it. Default: English.
     paper
         Size of the pages: "a4" or "letter".
+    units
+        Units of the response in pictures and tables: "si", or "drive" for those of the recording or live source.
+        Parameters and limits are in SI units.
     limits
         Acceptance limits: a list of tables with quantity, min, max and band_hz.
     """
@@ -108,6 +112,7 @@ class ReportSection(ConfigurationSection):
     logo: File | None = None
     language: Language | None = None
     paper: Paper = "a4"
+    units: Literal["si", "drive"] = "si"
     limits: Annotated[list[LimitSection], Field(max_length=LIMITS_MAX)] = []
 
     def beside(self, folder: Path) -> ReportSection:
@@ -152,4 +157,6 @@ def report_error(first: Mapping[str, Any]) -> ConfigError:
         return ConfigError("value-invalid", f"{place}: {why}", "correct it", key=place)
     if "Quantities: " in why:
         return ConfigError("value-invalid", f"{place} = {value} is not a quantity", why, key=place, value=value)
-    return ConfigError("value-invalid", f"{place} = {value} is not usable: {why}", "correct it", key=place, value=value)
+    meant = meant_value(first["type"], first["input"])
+    remedy = "correct it" if meant is None else f"write {meant}"
+    return ConfigError("value-invalid", f"{place} = {value} is not usable: {why}", remedy, key=place, value=value)

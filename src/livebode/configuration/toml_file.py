@@ -8,11 +8,12 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from livebode.configuration.toml_mistakes import meant_lines, meant_path, mistake_at
 from livebode.core import ConfigError, LivebodeError
 
 FILE_BYTES_MAX = 1 << 20
 _SHOWN = 120
+_TWICE = ("Cannot overwrite a value", "Cannot declare (")
+"""How the errors of tomllib begin that are about a line and an earlier one."""
 _QUOTED = re.compile(r'"""(?:[^\\]|\\.)*?"""|\'\'\'.*?\'\'\'|"(?:[^"\\\n]|\\.)*"|\'[^\'\n]*\'|#[^\n]*', re.DOTALL)
 _BETWEEN_KEYS, _PARTS_MAX = re.compile(r"[,=\[\]{}\n]"), 64
 """For a key of many parts tomllib takes the square of their number."""
@@ -84,6 +85,10 @@ def meant_line(line: str) -> str | None:
     >>> meant_line("output = “y”"), meant_line("// my axis"), meant_line('output = "y'), meant_line("[source")
     ('output = "y"', '# my axis', 'output = "y"', '[source]')
     """
+    from livebode.configuration.toml_mistakes import meant_lines  # needed for a mistake only
+
+    if len(line) > _TEXT_MAX:  # nobody wrote it by hand, and the patterns take the square of its length
+        return None
     return next((meant for meant in meant_lines(line) if meant != line and _is_toml(meant)), None)
 
 
@@ -114,11 +119,23 @@ def _not_utf8(data: bytes, at: int, origin: str) -> ConfigError:
 
 def _not_toml(text: str, why: str, origin: str) -> ConfigError:
     """The error of tomllib, with the line and what was probably meant."""
+    from livebode.configuration.toml_mistakes import mistake_at, without_thousands  # needed for a mistake only
+
     found = mistake_at(why, text)
+    if found is not None and why.startswith(_TWICE):
+        return ConfigError(
+            "not-toml",
+            f"{origin!r} is not TOML in line {found[0]}: {one_line(found[1])}",
+            "it is in the file twice; remove one, and write the keys of a section below one header",
+            path=origin,
+            line=found[0],
+        )
     meant = None if found is None else meant_line(found[1])
     if found is None or meant is None:
         return ConfigError("not-toml", f"{origin!r} is not TOML: {one_line(why)}", "correct it there", path=origin)
     remedy = f"write {one_line(meant)}"
+    if without_thousands(found[1]) == meant:
+        remedy += f", or {found[1].replace(',', '.', 1)} if the comma is a decimal one"
     if "\\" in meant:
         remedy += f" or {one_line(meant.replace(chr(92), '/'))}"
     return ConfigError(
@@ -186,19 +203,26 @@ def _check_text(text: str, place: str, origin: str) -> None:
             key=place,
             limit=long,
         ).at(origin)
+    if not text.isprintable():
+        _check_escapes(text, place, origin)
+        raise ConfigError(
+            "value-invalid",
+            f"{place} = {shortened(text)} has a letter that cannot be printed",
+            "remove it",
+            key=place,
+            value=shortened(text),
+        ).at(origin)
+
+
+def _check_escapes(text: str, place: str, origin: str) -> None:
+    """ConfigError for a Windows path in double quotes, whose backslashes became control characters."""
+    from livebode.configuration.toml_mistakes import meant_path  # needed for a mistake only
+
     if (path := meant_path(text)) is not None:
         raise ConfigError(
             "value-invalid",
             f"{place} = {shortened(text)} has a backslash in double quotes, which begins a special letter",
             f"write '{path}' in single quotes, or {path.replace(chr(92), '/')}",
-            key=place,
-            value=shortened(text),
-        ).at(origin)
-    if not text.isprintable():
-        raise ConfigError(
-            "value-invalid",
-            f"{place} = {shortened(text)} has a letter that cannot be printed",
-            "remove it",
             key=place,
             value=shortened(text),
         ).at(origin)

@@ -6,12 +6,18 @@ import difflib
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from math import inf
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core._unit_reading import KINDS, QuantityKind, read_unit, split_plant_unit
 from livebode.core.errors import SignalError, UsageError
+
+if TYPE_CHECKING:
+    from livebode.core._response import Response, Responses
+
+_R = TypeVar("_R", "Response", "Responses")
 
 
 @dataclass(frozen=True)
@@ -210,6 +216,40 @@ def nearest_name(name: str, names: Iterable[str], kind: str = "Channels") -> str
     near = difflib.get_close_matches(name.casefold(), folded, n=1, cutoff=0.5)
     hint = f"did you mean {folded[near[0]]!r}? " if near else ""
     return f"{hint}{kind}: {', '.join(known) or 'none'}"
+
+
+@dataclass(frozen=True)
+class SourceUnit:
+    """The unit of a plant in the units of its source, where these are not SI units.
+
+    Attributes
+    ----------
+    unit
+        The unit of the output in the source, and that of the input.
+    factor
+        Of these units in one SI unit of the plant: a response, its sigma and its distortion are multiplied by it.
+
+    Examples
+    --------
+    >>> speed = Channel("n", "rad/s", written="rpm", factor=0.10472)
+    >>> SourceUnit.of(speed, Channel("M", "N m", written="%", factor=0.024))
+    SourceUnit(unit='rpm/(%)', factor=0.22918258212375859)
+    """
+
+    unit: str
+    factor: float
+
+    @classmethod
+    def of(cls, output: Channel, input: Channel) -> SourceUnit | None:
+        """From the channels of the plant's output and input; None where both have the units of the source."""
+        if output.factor == input.factor == 1:
+            return None
+        return cls(f"{output.source_unit}/({input.source_unit})", input.factor / output.factor)
+
+    def converted(self, response: _R) -> _R:
+        """A response or responses in SI units, in this unit."""
+        scaled = {name: getattr(response, name) * self.factor for name in ("value", "sigma", "distortion")}
+        return replace(response, **scaled, unit=self.unit)
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,8 @@ from livebode.core.model import Model, as_model
 
 Logged = Literal["before", "after"]
 Controllers = Sequence[Sequence[object]]
+CHANNELS_MAX = 8
+"""Largest number of inputs, and of outputs, of a matrix of responses."""
 
 
 @dataclass(frozen=True)

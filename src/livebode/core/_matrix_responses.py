@@ -24,9 +24,6 @@ if TYPE_CHECKING:
 
 Names = str | int | Sequence[str | int] | None
 
-CHANNELS_MAX = 8
-"""Largest number of inputs, and of outputs."""
-
 REASONS = ("", Message("incomplete"), Message("not excited"), Message("not separated"))
 """Why a column is invalid, by its number in `MatrixResponses.reason`; the first is that of a valid one."""
 

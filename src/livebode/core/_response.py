@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from livebode.arrays import Floats
-from livebode.core import _conversion
 from livebode.core._frequency_response import PER_LINE, FrequencyResponse, Quantity
 from livebode.core.clock import moment
 from livebode.core.distributions import CIRCLE_FACTOR, COVERAGE
@@ -152,7 +151,9 @@ class Response(FrequencyResponse):
         >>> (frd.omega[:3] / (2 * np.pi)).round(9).tolist()
         [20.0, 30.0, 40.0]
         """
-        return _conversion.frd(self)
+        from livebode.core._conversion import frd
+
+        return frd(self)
 
     def __repr__(self) -> str:
         return of_response(self)

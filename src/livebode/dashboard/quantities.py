@@ -6,16 +6,27 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from math import log10
 from typing import Any, get_args
 
 import numpy as np
 
 from livebode.arrays import Complex
 from livebode.configuration import recorded_loop
-from livebode.core import Lines, Loop, Model, PlantKinds, Quantity, Responses, ServerError, split_plant_unit
+from livebode.core import (
+    Lines,
+    Loop,
+    Model,
+    PlantKinds,
+    Quantity,
+    Responses,
+    ServerError,
+    SourceUnit,
+    split_plant_unit,
+)
 from livebode.estimation import convert
 from livebode.language import Message
-from livebode.records import kinds_in, lines_in
+from livebode.records import kinds_in, lines_in, source_unit_in
 
 QUANTITIES: tuple[Quantity, ...] = get_args(Quantity)
 POWERS = range(-2, 3)
@@ -43,6 +54,8 @@ class Quantities:
         The loop of the configuration; None if it cannot be built.
     kinds
         Kinds of the plant's output and input.
+    source_unit
+        Its unit in the units of the source; None if it is the same.
     """
 
     own: Quantity
@@ -50,6 +63,7 @@ class Quantities:
     lines: Lines
     loop: Loop | None
     kinds: PlantKinds = field(default_factory=PlantKinds)
+    source_unit: SourceUnit | None = None
 
     @classmethod
     def of(cls, summary: Mapping[str, Any]) -> Quantities:
@@ -60,7 +74,7 @@ class Quantities:
             loop = recorded_loop(dict(summary)).build(lines.rate_hz)
         except ValueError:  # of livebode or of pydantic
             loop = None
-        return cls(settings["quantity"], settings["unit"], lines, loop, kinds_in(settings))
+        return cls(settings["quantity"], settings["unit"], lines, loop, kinds_in(settings), source_unit_in(settings))
 
     @property
     def feedback(self) -> Model | None:
@@ -84,6 +98,13 @@ class Quantities:
     def units_of(self, quantity: Quantity) -> list[str]:
         """The units of a quantity times (jω)ⁿ for n from −2 to 2: of derivatives and integrals."""
         return [per_seconds(self.unit_of(quantity), power) for power in POWERS]
+
+    def in_source_units(self, quantity: Quantity) -> dict[str, Any] | None:
+        """`units_of` in the units of the source, and its values above SI in dB; None if they are the same."""
+        if self.source_unit is None or quantity != self.own:
+            return None
+        units = [per_seconds(self.source_unit.unit, power) for power in POWERS]
+        return {"units": units, "db": 20 * log10(self.source_unit.factor)}
 
     def fit(self, responses: Responses) -> bool:
         """Whether responses have this run's quantity and frequencies; those of a previous run may differ."""

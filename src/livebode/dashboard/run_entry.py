@@ -43,6 +43,8 @@ class RunEntry:
         When run.json was written, seconds since 1970.
     lines, low_hz, high_hz, estimator
         Number and span of the lines; 0 lines of an output-only run.
+    averaged
+        Whether each response is the average of all periods before it, from which no baseline is learned.
     tone, message, alarms
         Verdict of the monitoring, its sentence, and how many alarms are active.
     fit
@@ -69,6 +71,7 @@ class RunEntry:
     low_hz: float | None = None
     high_hz: float | None = None
     estimator: str = ""
+    averaged: bool = False
     tone: str = "open"
     alarms: int = 0
     model: str = ""
@@ -132,6 +135,7 @@ def _readable(run: Path, summary: dict[str, Any], size: int, newest: dict[str, f
         estimator=""
         if "output_only" in summary
         else "".join(_texts(configuration.get("tracking") or {}, ("estimator",))),
+        averaged=(configuration.get("tracking") or {}).get("average") is True,
         tone=tone,
         alarms=alarms,
         model=str(summary.get("fit", {}).get("model", ""))[:80],

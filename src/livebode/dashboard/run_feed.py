@@ -75,14 +75,14 @@ class RunFeed:
         items: list[Item] = [new for part in self._run.between(*behind_s) if (new := self._new(part)) is not None]
         rows = list(self._parameters(behind_s))
         items += self._new_events()
-        return items, rows, self._run.summary, self._run.finished
+        return items, rows, self._run.summary, self._run.ended
 
     def rest(self, state: State) -> None:
         """Pass parameters and events."""
         for model, name, unit, rows in self._parameters(None):
             state.trends.add(model, [name], [unit], rows)
         state.add(list(self._new_events()))
-        state.finished = self._run.finished
+        state.finished = self._run.ended
         state.read()
 
     def _new_events(self) -> list[Event]:

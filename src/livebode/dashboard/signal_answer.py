@@ -242,7 +242,13 @@ def answer(block: Block, lines: Lines, picture: Picture) -> bytes:
 
 
 def _channel(channel: Channel, x: NDArray[np.float64], lines: Lines, picture: Picture) -> tuple[dict[str, Any], _Parts]:
-    about: dict[str, Any] = {"name": channel.name, "unit": channel.unit, **asdict(remark_of(x))}
+    about: dict[str, Any] = {
+        "name": channel.name,
+        "unit": channel.unit,
+        "source_unit": channel.source_unit,
+        "factor": channel.factor,
+        **asdict(remark_of(x)),
+    }
     if picture == "time":
         points = extremes(x)
         return about | {"points": len(points)}, [points.astype("<u4"), x[points].astype("<f4")]

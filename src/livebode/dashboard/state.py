@@ -293,6 +293,7 @@ class State:
                     "symbol": _SYMBOLS[name],
                     "unit": q.unit_of(name),
                     "units": q.units_of(name),
+                    "drive": q.in_source_units(name),
                     "why_not": for_page(q.why_not(name)),
                 }
                 for name in QUANTITIES

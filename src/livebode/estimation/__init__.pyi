@@ -9,6 +9,7 @@ from livebode.estimation.implausible import SpikeGate as SpikeGate
 from livebode.estimation.line_stage import LineStage as LineStage
 from livebode.estimation.line_stage import plant_kinds as plant_kinds
 from livebode.estimation.line_stage import response_unit as response_unit
+from livebode.estimation.line_stage import source_unit as source_unit
 from livebode.estimation.movement import PLACES as PLACES
 from livebode.estimation.movement import Movement as Movement
 from livebode.estimation.nonperiodic_stage import separable as separable

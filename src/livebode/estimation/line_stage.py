@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Flags, Floats
-from livebode.core import Channel, Event, PlantKinds, Responses, Stage, StatefulBase
+from livebode.core import Channel, Event, PlantKinds, Responses, SourceUnit, Stage, StatefulBase
 from livebode.estimation.detection import DetectionNoise, beyond
 from livebode.estimation.movement import Movement
 from livebode.estimation.periodicity import Periodicity
@@ -342,6 +342,11 @@ def response_unit(channels: Sequence[Channel], settings: Settings) -> str:
     """Unit of the response where both signals have one; open loop, closed loop and sensitivity have none."""
     output, input = _ends(channels, settings)
     return f"{output.unit}/({input.unit})" if output.unit and input.unit and settings.quantity == "plant" else ""
+
+
+def source_unit(channels: Sequence[Channel], settings: Settings) -> SourceUnit | None:
+    """Unit of the response in the units of the source; None if it is the same, or the response has none."""
+    return SourceUnit.of(*_ends(channels, settings)) if response_unit(channels, settings) else None
 
 
 def plant_kinds(channels: Sequence[Channel], settings: Settings) -> PlantKinds:

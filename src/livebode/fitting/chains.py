@@ -273,7 +273,7 @@ class TwoMassGain(PhysicalModel):
     @property
     def gain_unit(self) -> str:
         """Unit of an acceleration per unit of input."""
-        per_s = "s" if self.output == "velocity" else "s²"
+        per_s = {"velocity": "s", "position": "s²"}[self.output]
         if not self.output_unit or not self.input_unit:
             return Message("output units/{per_s} per input unit", per_s=per_s)
         angular = {"rad": "rad/s²", "rad/s": "rad/s²", "m": "m/s²", "m/s": "m/s²"}

@@ -78,15 +78,17 @@ class ExtendedModel(PhysicalModel):
     @property
     def parameters(self) -> tuple[Parameter, ...]:  # type: ignore[override]
         least = 0.0 if getattr(self.base, "side", "motor") == "motor" else -inf
-        gain: str = getattr(self.base, "gain_unit", "")
-        compliance = f"{gain} s²" if gain else "rad per unit of input"
+        own_gain: str = getattr(self.base, "gain_unit", "")
+        effort = ("m", "N") if getattr(self.base, "linear", False) else ("rad", "(N m)")  # of masses in SI units
+        gain = own_gain or f"{effort[0]}/s²/{effort[1]}"
+        compliance = f"{gain} s²" if own_gain else f"{effort[0]}/{effort[1]}"
         own = {
             LAG: (Parameter("lag", "s", 1e-4, 1e-6, 1.0),),
             RESIDUAL: (Parameter("residual_compliance", compliance, 0.0, least, inf),),
             MODE: (
                 Parameter("mode", "Hz", 1.5 * self.top_hz, 1e-4, 1e6),
                 Parameter("mode_damping", "", START_DAMPING, 1e-6, 2.0),
-                Parameter("mode_gain", gain or Message("rad/s² per unit of input"), 0.0, least, inf),
+                Parameter("mode_gain", gain, 0.0, least, inf),
             ),
         }
         return (*self.base.parameters, *(p for extra in self.extras for p in own[extra]))

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Floats
-from livebode.core import FitError, MatrixResponses, Response, Responses, SignalError
+from livebode.core import FitError, Response, Responses, SignalError
 from livebode.fitting.drift import Drift, DriftTest
+
+if TYPE_CHECKING:
+    from livebode.core import MatrixResponses
 
 _FIRST_VERDICT = 3  # windows that may be valid before the first verdict: three periods, of which two are complete
 
@@ -375,6 +379,8 @@ def _without_overlap(responses: MatrixResponses, rows: NDArray[np.intp]) -> NDAr
 
 
 def _weighted(of: MatrixResponses) -> MatrixResponses:
+    from livebode.core import MatrixResponses  # loaded by a matrix run only
+
     between = (len(of) - 1.0) * len(of.inputs)
     with np.errstate(invalid="ignore"):
         weight = 1.0 / np.einsum("rkii->rk", of.spread).real

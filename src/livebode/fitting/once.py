@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from livebode.core import COVERAGE, FitError, Parameters, Response, Responses, not_installed
+from livebode.core import COVERAGE, FitError, Parameters, Response, Responses, not_installed, with_bound
 from livebode.fitting.competitors import WORDS, AllowedChanges, Competitor, compete, competitor, mixed, positive
 from livebode.fitting.fitter import Fitter
 from livebode.fitting.mean import mean_response
@@ -77,8 +77,9 @@ class Fit:
         band = f"{self.lines} lines, {self.band_hz[0]:g} … {self.band_hz[1]:g} Hz"
         if self.status != "ok":
             return f"<Fit: {self.model.name} to {band}: {self.sentence}>"
-        held = (f"{name} = {value:.5g} ± {bound:.2g} {unit}".strip() for name, value, bound, unit in self.rows())
-        return f"<Fit: {self.model.name} to {band}: {', '.join(held)}>"
+        rows = ((name, *with_bound(value, bound), unit) for name, value, bound, unit in self.rows())
+        values = (f"{name} = {value} ± {bound} {unit}".strip() for name, value, bound, unit in rows)
+        return f"<Fit: {self.model.name} to {band}: {', '.join(values)}>"
 
     @property
     def status(self) -> str:

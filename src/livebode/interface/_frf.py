@@ -15,12 +15,13 @@ from numpy.typing import ArrayLike, NDArray
 from livebode.configuration import Axis
 from livebode.core import (
     LivebodeError,
+    NamedSamples,
     RecordingError,
     Response,
     Responses,
-    Series,
     SignalWarning,
     UsageError,
+    counted,
     series_of,
 )
 from livebode.estimation import response_unit, welch
@@ -206,10 +207,9 @@ def track(
 def _roles(name: str, signals: Sequence[Any]) -> tuple[dict[str, Any], list[Any] | tuple[Any]]:
     """The signals but the output by their role, and the outputs: a list if several were given, else a tuple of one."""
     if len(signals) not in (2, 3):
-        number = f"{len(signals)} signal{'s' * (len(signals) != 1)}"
         raise UsageError(
             "wrong-shape",
-            f"{name} got {number} without a keyword",
+            f"{name} got {counted(len(signals), 'signal')} without a keyword",
             f"call {name}(u, y, fs=4000) or, in a control loop, {name}(w, u, y, fs=4000)",
             argument="signals",
         )
@@ -274,7 +274,7 @@ class _Arrays(Recording):
 
     format = "arrays"
 
-    def __init__(self, name: str, series: Mapping[str, Series]) -> None:
+    def __init__(self, name: str, series: Mapping[str, NamedSamples]) -> None:
         super().__init__(Path(name))
         samples = next(iter(series.values())).values.size
         self.columns = tuple(

@@ -17,6 +17,7 @@ from typing import Any
 from livebode.language.quantity_names import QUANTITY_NAMES
 
 _PLURAL_PERIOD = 100
+_WITH_EXPONENT = 1e6
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,8 +135,19 @@ def trn(singular: str, many: str, number: int, /, **values: Any) -> str:
 
 
 def number(value: Any, spec: str = "") -> str:
-    """A number in the format `spec`, with the decimal sign of the language."""
-    return numerals(format(value, spec))
+    """A number in the format `spec`, with the decimal sign of the language; below a million without an exponent.
+
+    >>> number(212.4, ".2g"), number(-574.3, "+.2g"), number(2.1e7, ".2g"), number(9.99e5, ".2g")
+    ('210', '-570', '2.1e+07', '1e+06')
+    """
+    return numerals(_formatted(value, spec))
+
+
+def _formatted(value: Any, spec: str) -> str:
+    text = format(value, spec)
+    if not spec.endswith("g") or "e+" not in text or abs(float(text)) >= _WITH_EXPONENT:
+        return text
+    return format(float(text), f"{spec.partition('.')[0]}.0f")
 
 
 def numerals(text: str, language: Catalogue | None = None) -> str:
@@ -156,8 +168,7 @@ def date(moment: datetime) -> str:
 
 class _Formatter(string.Formatter):
     def format_field(self, value: Any, spec: str) -> str:
-        text = format(value, spec)
-        return numerals(text) if isinstance(value, Real) else text
+        return numerals(_formatted(value, spec)) if isinstance(value, Real) else format(value, spec)
 
 
 _FORMATTER = _Formatter()

@@ -9,6 +9,7 @@ from typing import Any
 
 from livebode.core import LivebodeError, LocationError, not_installed
 from livebode.locations.url import Url
+from livebode.plugins import named
 
 _logger = logging.getLogger(__name__)
 _CREDENTIALS = "give credentials as the storage expects them (docs/how-to/remote.md)"
@@ -53,7 +54,10 @@ def opened(url: Url) -> tuple[Any, str]:
             ) from None
         raise _unusable(url, error, "install that package") from None
     except ValueError as error:
-        raise _unusable(url, error, "check the part before ://") from None
+        remedy = "check the part before ://"
+        if url.scheme in named("sources"):
+            remedy = f"it is a live source: write its configuration by livebode inspect {url} --out axis.toml"
+        raise _unusable(url, error, remedy) from None
     return system, path
 
 

@@ -13,12 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Floats
-from livebode.core import MatrixResponses, PlotKind, Response, Responses, UsageError, decibels, needing
+from livebode.core import PlotKind, Response, Responses, UsageError, decibels, needing
 from livebode.pictures.curves import FLOOR_DB, Cloud, Curve, bound_db, bound_deg, circular, near, quantiles
 from livebode.pictures.ticks import frequency_label
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+    from livebode.core import MatrixResponses
 
 FEW_LINES = 40
 """Up to this many lines each has a marker and an error bar; more are drawn as a band."""

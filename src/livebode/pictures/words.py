@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from livebode.core import MatrixResponses, Response, Responses, moment, moment_of_start
+from livebode.core import Response, Responses, moment, moment_of_start
 from livebode.language import Message, numerals, quantity_name, tr, trn, worded
 from livebode.pictures._style import shortened
 from livebode.pictures.ticks import frequency_label
+
+if TYPE_CHECKING:
+    from livebode.core import MatrixResponses
 
 _SYMBOL: dict[str, str] = {
     Message("plant"): "G",

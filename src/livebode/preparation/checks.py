@@ -83,16 +83,17 @@ class ChannelCheck(StatefulBase):
             )
 
 
-def check_length(samples: int | None, window: int) -> None:
-    """SignalError if the recording is shorter than the window."""
-    if samples is not None and samples < window:
-        raise SignalError(
-            "too-short",
-            f"the recording has {samples} samples, less than the window of {window}",
-            "choose a shorter window, or record more",
-            samples=samples,
-            window=window,
-        )
+def check_length(samples: int | None, window: int, hop: int | None = None) -> None:
+    """SignalError if the recording is shorter than the window or the hop: it would have no response."""
+    for name, size in (("window", window), ("hop", hop or 0)):
+        if samples is not None and samples < size:
+            raise SignalError(
+                "too-short",
+                f"the recording has {samples} samples, less than the {name} of {size}",
+                f"choose a shorter {name}, or record more",
+                samples=samples,
+                **{name: size},
+            )
 
 
 def check_excitation(tracker: Follower, variance: float) -> None:

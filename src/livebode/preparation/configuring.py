@@ -4,28 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 import tomli_w
 
 from livebode.configuration import Axis, check_fit
-from livebode.core import Lines, LivebodeError, counted
+from livebode.core import Lines, LivebodeError
 from livebode.estimation import DETECTION_LINES_MIN
 from livebode.excitation import recognise
+from livebode.language import Message
 from livebode.preparation.followers import make_settings
 from livebode.preparation.nonperiodic import suits_lpm
 from livebode.preparation.plan import Recorded, beginning, roles_in_doubt
 from livebode.sources import Log
 
-if TYPE_CHECKING:
-    from livebode.preparation.proposal import Proposals
-
 _NOT_REPEATING = ("signal.not-periodic", "signal.too-short")
-_FITTED = ("velocity", "position")
 _PERIODIC = ("joint", "direct")
 _FITTED_LINES_MIN = 4
 """Complex values for the six free parameters of two masses with an unknown gain."""
 _COLUMN = 28  # of the comments
+_FITTED = ("velocity", "position")
+_MOTIONS = (*_FITTED, "acceleration")
 
 Tables = dict[str, dict[str, Any]]
 
@@ -65,20 +64,22 @@ def suitable_estimator(log: Recorded, signals: Mapping[str, str]) -> tuple[str, 
         recognise(w, log.rate_hz)
     except LivebodeError as error:
         if error.code in _NOT_REPEATING and suits_lpm(w, log.rate_hz):
-            return "lpm", f"{reference} does not repeat, as noise or a single chirp"
+            return "lpm", Message("{channel} does not repeat, as noise or a single chirp", channel=reference)
     if "excitation" not in signals:
-        return "direct", "without the excitation: for an open loop"
-    return "joint", "for a machine in a control loop, whose excitation repeats"
+        return "direct", Message("without the excitation: for an open loop")
+    return "joint", Message("for a machine in a control loop, whose excitation repeats")
 
 
-def suitable_model(proposals: Proposals, signals: Mapping[str, str], estimator: str) -> str:
-    """The model to fit for these roles: "auto" for a velocity or a position with enough lines, else "none"."""
-    kinds = {channel.name: channel.kind for channel in proposals.channels}
+def suitable_model(log: Recorded, signals: Mapping[str, str], estimator: str) -> str:
+    """The model to fit for these roles: "auto" for a drive, to its motion, with enough lines; else "none"."""
+    kinds = {channel.name: channel.stated_kind for channel in log.channels}
     reference = signals.get("excitation") or signals.get("input")
     if reference is None or kinds.get(signals["output"]) not in _FITTED or estimator not in _PERIODIC:
         return "none"
+    if kinds.get(signals.get("input", "")) in _MOTIONS:  # a reference: its loop is no machine
+        return "none"
     try:
-        found = recognise(beginning(proposals.log, reference), proposals.log.rate_hz)
+        found = recognise(beginning(log, reference), log.rate_hz)
     except LivebodeError:  # a run gives the reason
         return "none"
     return "auto" if len(found.lines) >= _FITTED_LINES_MIN else "none"
@@ -127,14 +128,19 @@ def settled(log: Recorded, tables: Tables, reasons: Mapping[str, str]) -> Settle
     comments = {("signals", role): reason for role, reason in reasons.items()}
     if not settings.periodic:
         return Settled(tables, comments, doubts)
-    lines, periods = settings.lines, "one period"
+    lines, periods = settings.lines, Message("one period")
     if "schedule" in tables["signals"] and len(lines.quiet) < DETECTION_LINES_MIN:
         lines = Lines(tuple(2 * k for k in lines.bins), lines.window * 2, log.rate_hz)
-        periods = "two periods, so that bins without excitation show the noise in motion"
+        periods = Message("two periods, so that bins without excitation show the noise in motion")
     found = {"frequencies": lines.text, "window": lines.window}
-    ends = f"{lines.frequency_hz[0]:.6g} … {lines.frequency_hz[-1]:.6g} Hz"
-    comments["lines", "frequencies"] = f"{counted(len(lines), 'line')}, {ends}"
-    comments["lines", "window"] = f"samples: {lines.window / log.rate_hz:.6g} s, {periods}"
+    count = Message("1 line") if len(lines) == 1 else Message("{n} lines", n=len(lines))
+    low_hz, high_hz = lines.frequency_hz[0], lines.frequency_hz[-1]
+    comments["lines", "frequencies"] = Message(
+        "{count}, {low:.6g} … {high:.6g} Hz", count=count, low=low_hz, high=high_hz
+    )
+    comments["lines", "window"] = Message(
+        "samples: {s:.6g} s, {periods}", s=lines.window / log.rate_hz, periods=periods
+    )
     order = ("source", "signals", "lines")
     head = {name: tables[name] if name != "lines" else found for name in order}
     return Settled(head | {name: table for name, table in tables.items() if name not in order}, comments, doubts)

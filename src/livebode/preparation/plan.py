@@ -221,8 +221,7 @@ def auto_reference(axis: Axis) -> str:
 def make_lines(axis: Axis, log: Log) -> Lines:
     """The lines of the configuration, or those of the recording; LivebodeError if there are none."""
     frequencies, window = axis.lines.frequencies, axis.lines.window
-    if window != "auto":
-        check_length(log.samples, window)
+    check_length(log.samples, 0 if window == "auto" else window, axis.tracking.hop)
     if frequencies != "auto" and window != "auto":
         return Lines.parse(frequencies, log.rate_hz, window)
     reference = auto_reference(axis)

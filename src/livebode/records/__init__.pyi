@@ -1,5 +1,4 @@
 from livebode.records._query import query as query
-from livebode.records._result_rows import MATRIX_TABLES as MATRIX_TABLES
 from livebode.records._result_rows import RESPONSE_TABLES as RESPONSE_TABLES
 from livebode.records._result_rows import result_rows as result_rows
 from livebode.records.column_table import ColumnTable as ColumnTable
@@ -26,8 +25,7 @@ from livebode.records.matrix_run import entry_named as entry_named
 from livebode.records.matrix_run import entry_summary as entry_summary
 from livebode.records.matrix_run import is_matrix as is_matrix
 from livebode.records.matrix_run import matrix_unsupported as matrix_unsupported
-from livebode.records.matrix_table import COVARIANCE as COVARIANCE
-from livebode.records.matrix_table import MATRIX_RESPONSES as MATRIX_RESPONSES
+from livebode.records.matrix_table import MATRIX_TABLES as MATRIX_TABLES
 from livebode.records.matrix_table import covariance_rows as covariance_rows
 from livebode.records.matrix_table import matrix_rows as matrix_rows
 from livebode.records.notes import Notes as Notes
@@ -45,6 +43,7 @@ from livebode.records.response_table import parameter_rows as parameter_rows
 from livebode.records.run import RunRecord as RunRecord
 from livebode.records.run import kinds_in as kinds_in
 from livebode.records.run import lines_in as lines_in
+from livebode.records.run import source_unit_in as source_unit_in
 from livebode.records.run import steady as steady
 from livebode.records.run_directory import RunDirectory as RunDirectory
 from livebode.records.sample_table import as_rows as as_rows

@@ -6,17 +6,13 @@ from collections.abc import Mapping
 from functools import singledispatch
 from typing import Any
 
-from livebode.core import MatrixResponses, Parameters, Responses
+from livebode.core import Parameters, Responses
 from livebode.records.column_table import ColumnTable
-from livebode.records.matrix_table import COVARIANCE, MATRIX_RESPONSES, covariance_rows, matrix_rows
 from livebode.records.response_table import PARAMETERS, RESPONSES, as_batch, parameter_rows
 from livebode.tables import Table
 
 RESPONSE_TABLES: Mapping[str, ColumnTable] = {"responses": RESPONSES, "parameters": PARAMETERS}
 """Tables of a run with single responses."""
-
-MATRIX_TABLES: Mapping[str, ColumnTable] = {"responses": MATRIX_RESPONSES, "covariance": COVARIANCE}
-"""Tables of a matrix run."""
 
 
 @singledispatch
@@ -28,11 +24,6 @@ def result_rows(results: Any) -> Mapping[str, Table]:
 @result_rows.register
 def _(results: Responses) -> Mapping[str, Table]:
     return {"responses": as_batch(results)}
-
-
-@result_rows.register
-def _(results: MatrixResponses) -> Mapping[str, Table]:
-    return {"responses": matrix_rows(results), "covariance": covariance_rows(results)}
 
 
 @result_rows.register

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from livebode.arrays import Complex
 from livebode.core import REASONS, Lines, MatrixResponses
 from livebode.records import response_table
+from livebode.records._result_rows import result_rows
 from livebode.records.column_table import ColumnTable
 from livebode.tables import Field, Schema, Table, Text
 
@@ -45,6 +46,8 @@ MATRIX_RESPONSES = ColumnTable(
     SCHEMA, (*response_table.RESPONSES.repeating, "output", "input", "condition", "reason", "schedule")
 )
 COVARIANCE = ColumnTable(COVARIANCE_SCHEMA, ("sample", "time_s", "frequency_hz", "factor", "row", "column"))
+MATRIX_TABLES: Mapping[str, ColumnTable] = {"responses": MATRIX_RESPONSES, "covariance": COVARIANCE}
+"""Tables of a matrix run."""
 
 
 @dataclass(frozen=True)
@@ -64,6 +67,11 @@ class MatrixShape:
     def covariance_rows(self) -> int:
         """Rows of one response in covariance.parquet."""
         return len(self.lines) * (len(self.outputs) ** 2 + len(self.inputs) ** 2)
+
+
+@result_rows.register
+def _(results: MatrixResponses) -> Mapping[str, Table]:
+    return {"responses": matrix_rows(results), "covariance": covariance_rows(results)}
 
 
 def matrix_rows(responses: MatrixResponses) -> Table:

@@ -24,6 +24,7 @@ from livebode.core import (
     RecordError,
     Responses,
     RunClock,
+    SourceUnit,
 )
 from livebode.locations import original
 from livebode.records.grouped_events import still_waiting
@@ -55,6 +56,12 @@ _ROWS = 1 << 16  # of responses at once, times their lines: about 10 MB
 def lines_in(found: Mapping[str, Any]) -> Lines:
     """The lines in `found` of run.json."""
     return Lines(tuple(found["bins"]), found["window"], found["rate_hz"], tuple(found["quiet_bins"]))
+
+
+def source_unit_in(found: Mapping[str, Any]) -> SourceUnit | None:
+    """The unit of the plant in the units of the source, in `found` of run.json; None if it is the same."""
+    written = found.get("source_unit")
+    return None if written is None else SourceUnit(**written)
 
 
 def kinds_in(found: Mapping[str, Any]) -> PlantKinds:

@@ -124,6 +124,7 @@ def _not_a_run(run: Path) -> RecordError:
     message, remedy = f"{str(run)!r} is not the directory of a run: it has no run.json", "give the directory of a run"
     if run.is_file():
         message = f"{str(run)!r} is a file, not the directory of a run"
+        remedy = f"run it, and give the directory that this writes: livebode run {run}"
     elif not run.exists():
         message = f"there is no directory {str(run)!r}"
         runs = [found.parent.name for found in sorted(run.parent.glob(f"*/{RUN}"))[:_LISTED_MAX]]

@@ -42,6 +42,11 @@ class _Recording(_Part):
     stop: Count
 
 
+class _SourceUnit(_Part):
+    unit: Text
+    factor: Annotated[float, Field(gt=0)]
+
+
 class _Found(_Part):
     rate_hz: Annotated[float, Field(gt=0)]
     window: Positive
@@ -49,6 +54,7 @@ class _Found(_Part):
     quiet_bins: list[Positive]
     quantity: Text
     unit: Text
+    source_unit: _SourceUnit | None = None
     clock: ClockKind | None = None
     kinds: _Kinds = _Kinds(output=None, input=None)
     hop: Positive = 1

@@ -9,13 +9,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias, Union
 
-from livebode.core import Block, Channel, Event, MatrixResponses, Responses
+from livebode.core import Block, Channel, Event, Responses
 
 if TYPE_CHECKING:
     from livebode.analysis import Overview
-    from livebode.core import Parameters
+    from livebode.core import MatrixResponses, Parameters
     from livebode.runtime.run_control import RunControl
 
 VERSION = 1
@@ -104,18 +104,18 @@ class RunEnded:
     summary: Mapping[str, Any]
 
 
-Document = (
-    RunStarted
-    | Channels
-    | ClockSet
-    | Responses
-    | MatrixResponses
-    | FitResults
-    | Event
-    | TrackerResults
-    | RunStep
-    | RunEnded
-)
+Document: TypeAlias = Union[  # a name in it is that of a type which only a matrix run loads
+    RunStarted,
+    Channels,
+    ClockSet,
+    Responses,
+    "MatrixResponses",
+    FitResults,
+    Event,
+    TrackerResults,
+    RunStep,
+    RunEnded,
+]
 """New `Responses`, of a matrix run `MatrixResponses` (when a run continues, first the newest previous ones), an
 `Event`, or one of the classes here."""
 Subscriber = Callable[[Document], None]

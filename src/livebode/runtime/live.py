@@ -37,7 +37,7 @@ def run_live(axis: Axis, to: Destination, control: RunControl) -> Outcome:
     position = StreamPosition() if to.force else stream_position(successors.newest(to.directory))
     if position.left_at is not None:
         source.resume(position.left_at)
-    with source.open(partial(_report_late, to)), contextlib.ExitStack() as finishing:
+    with source.open(partial(_report_late, to, source)), contextlib.ExitStack() as finishing:
         estimate = rule(axis.kind, "estimate").live(axis, source)
         return _Succession(source, position, to, control, finishing).run(estimate)
 
@@ -54,14 +54,13 @@ def _check_apart(replayed: Path | None, directory: Path) -> None:
         )
 
 
-def _report_late(to: Destination, why: str) -> None:
+def _report_late(to: Destination, source: LiveSource, why: str) -> None:
     """Report that a machine has not sent yet; without a run, the time is that of this computer."""
-    event = Event(
-        "waiting",
-        0,
-        time.time(),
-        Message("{why}; the axis waits: switch the machine on, or check the address", why=why),
-    )
+    if source.unusable:  # switching the machine on would not help: it sends
+        message = Message("{why}; the axis waits: compare the sender with [source]", why=why)
+    else:
+        message = Message("{why}; the axis waits: switch the machine on, or check the address", why=why)
+    event = Event("waiting", 0, time.time(), message)
     _logger.warning("%s", event.message)
     to.announce(event)
 

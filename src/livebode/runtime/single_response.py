@@ -15,7 +15,7 @@ from livebode import fitting, preparation
 from livebode.analysis import LIVE_VALUES_MAX, Overview
 from livebode.configuration import Axis
 from livebode.core import INTERVAL_FACTOR, Block, Channel, Event, Lines, LivebodeError, Response, Responses, Stateful
-from livebode.estimation import Follower, Settings, plant_kinds, response_unit
+from livebode.estimation import Follower, Settings, plant_kinds
 from livebode.language import Message
 from livebode.preparation import check_excitation, check_some_valid
 from livebode.records import RESPONSE_TABLES
@@ -251,8 +251,7 @@ class SingleResponse(Estimate):
 
     def _described(self, about: Mapping[str, Any], channels: Sequence[Channel]) -> dict[str, Any]:
         found = dict(about.get("found", {})) | {"schedule": self.schedule_label}
-        plant = response_unit(channels, self.settings), plant_kinds(channels, self.settings)
-        return summary.begun(dict(about) | {"found": found}, self.follower, *plant)
+        return summary.begun(dict(about) | {"found": found}, self.follower, channels)
 
     def begin(self, run: RunContext) -> None:
         super().begin(run)

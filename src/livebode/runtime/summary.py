@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from livebode.configuration import Axis, recipe_id
-from livebode.core import ENCODING, ClockKind, PlantKinds, RunClock, iso_utc
-from livebode.estimation import Follower
+from livebode.core import ENCODING, Channel, ClockKind, RunClock, iso_utc
+from livebode.estimation import Follower, plant_kinds, response_unit, source_unit
 from livebode.kernel import instruction_set
 from livebode.locations import Location, local_copy
 from livebode.records import content_sha256, joined_sha256
@@ -101,9 +101,15 @@ def _modified_s(place: Location) -> float:
         return max(file.stat().st_mtime for file in files)
 
 
-def begun(about: Mapping[str, Any], tracker: Follower, unit: str, kinds: PlantKinds) -> dict[str, Any]:
+def begun(about: Mapping[str, Any], tracker: Follower, channels: Sequence[Channel]) -> dict[str, Any]:
     """Entries at the beginning: configuration, findings, versions."""
-    found = tracker.found() | {"quantity": tracker.settings.quantity, "unit": unit, "kinds": asdict(kinds)}
+    settings, written = tracker.settings, source_unit(channels, tracker.settings)
+    found = tracker.found() | {
+        "quantity": settings.quantity,
+        "unit": response_unit(channels, settings),
+        "source_unit": None if written is None else asdict(written),
+        "kinds": asdict(plant_kinds(channels, settings)),
+    }
     return dict(about) | {"found": about.get("found", {}) | found, "versions": versions()}
 
 

@@ -235,7 +235,10 @@ def _first_part(directory: Path) -> Path:
     for lister in dict.fromkeys(format_.parts for format_ in all_formats() if format_.parts):
         for part in loaded(lister)(directory):
             return Path(part)
-    raise RecordingError("not-a-file", f"{directory} is a directory", "name the file in it", path=str(directory))
+    message, remedy = f"{directory} is a directory", "name the file in it"
+    if (directory / "run.json").exists():
+        message, remedy = f"{directory} is a run, not a recording", f"see its results: livebode view {directory}"
+    raise RecordingError("not-a-file", message, remedy, path=str(directory))
 
 
 def no_frames(path: Path, title: str) -> RecordingError:

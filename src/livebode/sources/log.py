@@ -19,6 +19,7 @@ from livebode.sources.recording import Chunk, Column, Recording, Skipped, guarde
 from livebode.sources.timing import Clock, Timing
 
 BLOCK_SAMPLES_MAX = 1 << 24
+_NAMES_SHOWN = 8
 
 
 class Log:
@@ -37,6 +38,8 @@ class Log:
     ...     log = open_log(path)
     >>> log.format, log.rate_hz, log.channels[1]
     ('csv', 1000.0, Channel(name='iq', unit='A', kind='current'))
+    >>> print(str(log).replace(str(path), "log.csv"))
+    <Log 'log.csv': csv, 3 samples at 1000 Hz; t, iq>
     """
 
     even: ClassVar[bool] = True
@@ -61,6 +64,11 @@ class Log:
         """Number of the first sample that `blocks` reads."""
         self._stop: int | None = None
         self._named: tuple[Channel, ...] = ()
+
+    def __repr__(self) -> str:
+        names = ", ".join(channel.name for channel in self.channels[:_NAMES_SHOWN])
+        more = ", …" if len(self.channels) > _NAMES_SHOWN else ""
+        return f"<Log {str(self.path)!r}: {self.format}, {self.samples} samples at {self.rate_hz:g} Hz; {names}{more}>"
 
     @property
     def path(self) -> Location:

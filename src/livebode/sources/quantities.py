@@ -144,4 +144,5 @@ def _channel(name: str, source_name: str, unit: str, declared: QuantityKind | No
         unit = written if given is None else given
         kind = declared or (kind_by_name(source_name) if not reading.si else None) or reading.kind
         return Channel(name, unit, kind, written if written != unit else "")
+    written = written or given or ""
     return Channel(name, reading.si, reading.kind, written if written != reading.si else "", reading.factor)

@@ -11,9 +11,9 @@ from livebode.tables.delimited import Words as Words
 from livebode.tables.delimited import read_rows as read_rows
 from livebode.tables.delimited import write_rows as write_rows
 from livebode.tables.parquet_file import ParquetFile as ParquetFile
-from livebode.tables.parquet_footer import PACKED_MAX as PACKED_MAX
 from livebode.tables.parquet_footer import Footer as Footer
 from livebode.tables.parquet_footer import read_footer as read_footer
+from livebode.tables.parquet_format import PACKED_MAX as PACKED_MAX
 from livebode.tables.parquet_format import WRITER as WRITER
 from livebode.tables.parquet_writer import ParquetWriter as ParquetWriter
 from livebode.tables.parquet_writer import write_parquet as write_parquet

@@ -15,7 +15,16 @@ from typing import Any, BinaryIO, NamedTuple
 import numpy as np
 
 from livebode.tables.arrow_ipc import schema_from_message
-from livebode.tables.parquet_format import ARROW_SCHEMA, BYTE_ARRAY, FORMS, MAGIC, OPTIONAL, REPEATED, REQUIRED
+from livebode.tables.parquet_format import (
+    ARROW_SCHEMA,
+    BYTE_ARRAY,
+    FORMS,
+    MAGIC,
+    OPTIONAL,
+    PACKED_MAX,
+    REPEATED,
+    REQUIRED,
+)
 from livebode.tables.table import STRING, Field, Schema
 from livebode.tables.thrift_compact import BINARY, I32, I64, LIST, STRUCT, Struct, decode, field
 
@@ -29,8 +38,6 @@ _TYPE, _REPETITION, _NAME, _CHILDREN, _CONVERTED = (
 )  # fmt: skip
 _LOGICAL = field(10, STRUCT)
 _WRITER, _KEY, _VALUE = field(6, BINARY), field(1, BINARY), field(2, BINARY)
-PACKED_MAX = 100_000
-"""Highest plausible compression ratio of a recording; what declares more is damaged."""
 _CHUNKS, _SIZE, _GROUP_ROWS = field(1, LIST), field(2, I64), field(3, I64)
 _OTHER_FILE, _ABOUT = field(1, BINARY), field(3, STRUCT)
 _CODEC, _VALUES, _UNCOMPRESSED, _COMPRESSED = field(4, I32), field(5, I64), field(6, I64), field(7, I64)

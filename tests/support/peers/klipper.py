@@ -46,7 +46,7 @@ def measured(time_s: np.ndarray) -> np.ndarray:
 class Printer:
     """Answers one client after the other. `time_s` is its print time, which only sending advances.
 
-    With `numbered_hz` the acceleration in y is the print time times this rate.
+    With `numbered_hz` the acceleration in y, in m/s², is the print time times this rate.
     """
 
     def __init__(self, folder: Path, rate_hz: float = 3213.7, numbered_hz: float = 0.0) -> None:
@@ -126,7 +126,7 @@ class Printer:
         """A batch of the accelerometer; print times are estimated, and a batch is off by up to a microsecond."""
         time_s = self.time_s + np.arange(BATCH) / self.rate_hz
         self.time_s += BATCH / self.rate_hz
-        y = self._numbered_hz * time_s - 3.0
+        y = 1e3 * self._numbered_hz * time_s - 3.0  # in mm/s²
         rows = np.stack([time_s, measured(time_s), y, np.full(BATCH, 9810.0)], axis=1)
         rows[:, 0] += 1e-6 * np.sin(self.time_s * 1e3)
         self.send("adxl345", {"data": np.round(rows, 6).tolist(), "overflows": self.overflows})

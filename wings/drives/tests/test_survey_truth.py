@@ -32,7 +32,7 @@ def test_a_brokers_only_topic_is_found_and_its_fields_are_proposed(broker: Mosqu
         table = tomllib.loads(out.read_text())
         assert table["source"]["url"] == f"mqtt://127.0.0.1:{broker.port}/hall/press 3/axis1"
         assert (table["source"]["fields"], table["source"]["sample_field"]) == (FIELDS, "n")
-        assert table["signals"] == {"excitation": "inject", "input": "actual", "output": "vel"}
+        assert table["signals"] == {"excitation": "torque_inject", "input": "torque_actual", "output": "vel"}
         with open_source(SourceSettings(**table["source"])) as source:
             block = next(block for block in source.blocks() if len(block))
         first = source.first_sample

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,6 +13,7 @@ import pytest
 from livebode.core import PER_LINE, Block, Lines, Responses
 from livebode.estimation import Settings, Tracker
 from livebode.fitting import mean_response
+from livebode.interface import write_examples
 from livebode.records import RunRecord
 from livebode_reports.difference import ALPHA, Difference, compare
 from tests.support import command
@@ -158,3 +160,18 @@ def test_a_size_without_a_unit_is_refused(tmp_path: Path, size: str) -> None:
 def _first_lines(of: Responses, n: int) -> Responses:
     rows = {name: getattr(of, name)[:, :n] for name in PER_LINE}
     return replace(of, lines=Lines(of.lines.bins[:n], of.lines.window, of.lines.rate_hz), **rows)
+
+
+def test_of_equal_runs_each_amount_is_zero_and_no_number_below_a_million_has_an_exponent(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    write_examples(["standstill"], tmp_path)
+    assert livebode("run", "standstill.toml").code == 0
+    shutil.copytree("runs/standstill", "runs/again")
+    shown = livebode("compare", "runs/standstill", "runs/again").out
+    rows = [row for row in shown.splitlines() if " → " in row]
+    assert len(rows) >= 8
+    for row in rows:
+        assert " 0 ± " in row
+    assert "e+0" not in shown

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import re
 from pathlib import Path
 
 import numpy as np
@@ -10,10 +12,11 @@ import pytest
 
 from livebode.core import Responses
 from livebode.records import RunRecord
+from livebode_start.workspace import Workspace
 from tests.support.browser import Tab, chromium
 from tests.support.command import livebode
 from tests.support.start_pages import CHANNELS, drop, start_page
-from tools.two_mass_servo import Servo, write_servo
+from tools.two_mass_servo import LOAD, MOTOR, STIFFNESS, Servo, write_servo
 
 PHONE = {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobile": True}
 
@@ -47,6 +50,24 @@ def test_from_a_csv_to_a_bode_plot_with_bounds_without_toml(tmp_path: Path) -> N
         assert tab.wrong == []
     np.testing.assert_allclose(shown_db, 20 * np.log10(np.abs(newest(folder / "servo").value[0])), atol=0.01)
     check_truth(folder / "servo")
+
+
+def test_the_largest_text_of_a_measured_servo_is_its_resonance_in_the_language_of_the_reader(tmp_path: Path) -> None:
+    log = write_servo(tmp_path / "servo.csv")
+    with start_page(tmp_path / "runs") as url, chromium() as browser, Tab(browser, url, wait=False, locale="de") as tab:
+        drop(tab, log)
+        assert tab.page.inner_text("#role-schedule-reason") == "kein Kanal bietet sich an"
+        assert tab.page.inner_text("#role-input-reason") == "ein Drehmoment in N m"
+        assert tab.page.inner_text("#lines-found").endswith(" Linien, 4 … 600 Hz")
+        assert tab.page.inner_text("#window-found") == "Abtastwerte: 0,5 s, eine Periode"
+        tab.page.click("#measure")
+        tab.page.wait_for_url("**/run/servo/")
+        tab.page.wait_for_function("() => /^Resonanz/.test(document.getElementById('headline').innerText)")
+        headline = tab.page.inner_text("#headline")
+        assert tab.wrong == []
+    value, bound = (float(n.replace(",", ".")) for n in re.findall(r"[\d,]+", headline)[:2])
+    truth_hz = np.sqrt(STIFFNESS * (1 / MOTOR + 1 / LOAD)) / (2 * np.pi)
+    assert abs(value - truth_hz) < 2 * bound < 0.5
 
 
 def test_the_configuration_is_what_inspect_writes_and_the_terminal_runs(
@@ -114,6 +135,65 @@ def test_a_german_csv_is_measured_on_a_phone(tmp_path: Path) -> None:
         tab.page.wait_for_url("**/run/**")
         assert tab.wrong == []
     check_truth(folder / "Prüfstand 3")
+
+
+def test_a_recording_beside_the_directory_is_chosen_and_the_terminal_repeats_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    write_servo(tmp_path / "servo.csv")
+    for number in range(8):
+        write_servo(tmp_path / f"short {number}.csv", Servo(periods=1))
+        os.utime(tmp_path / f"short {number}.csv", (2e9, 2e9))
+    (tmp_path / "notes.toml").write_text("")
+    (tmp_path / "link.csv").symlink_to("servo.csv")
+    with start_page(Path("runs")) as url, chromium() as browser, Tab(browser, url, wait=False) as tab:
+        tab.page.wait_for_selector(".recordings a")
+        assert not tab.page.is_visible("text=../servo.csv")
+        tab.page.click(".here button")
+        names = tab.page.locator(".recordings a").all_inner_texts()
+        assert sorted(names) == [f"../{name}" for name in ("servo.csv", *(f"short {k}.csv" for k in range(8)))]
+        tab.page.click("text=../servo.csv")
+        tab.page.wait_for_selector("#measure:enabled")
+        tab.page.click("#measure")
+        tab.page.wait_for_url("**/run/servo/")
+        assert tab.wrong == []
+    check_truth(Path("runs/servo"))
+    monkeypatch.chdir(tmp_path / "runs")
+    assert livebode("run", "servo.toml", "--out", "terminal").code == 0
+    np.testing.assert_array_equal(newest(Path("terminal")).value, newest(Path("servo")).value)
+
+
+@pytest.mark.parametrize("elsewhere", ["home/runs", "link"])
+def test_only_beside_a_directory_in_the_working_one_recordings_are_offered(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, elsewhere: str
+) -> None:
+    write_servo(tmp_path / "servo.csv")
+    (tmp_path / "home" / "runs").mkdir(parents=True)
+    (tmp_path / "link").symlink_to("home/runs")
+    monkeypatch.chdir(tmp_path)
+    assert Workspace(Path(elsewhere)).recordings() == []
+    assert [row["name"] for row in Workspace(Path("runs")).recordings()] == ["../servo.csv"]
+
+
+def test_a_measurement_is_followed_and_can_be_cancelled_after_a_reload_in_the_middle(tmp_path: Path) -> None:
+    folder = tmp_path / "runs"
+    with start_page(folder) as url, chromium() as browser, Tab(browser, url, wait=False) as tab:
+        drop(tab, write_servo(tmp_path / "servo.csv", Servo(periods=400)))
+        tab.page.click("#measure")
+        tab.page.wait_for_selector(".job button")
+        tab.page.reload()
+        tab.page.click(".job button")
+        tab.page.wait_for_selector("#ready.wrong")
+        assert "cancelled" in tab.page.inner_text("#ready")
+        tab.page.reload()  # a job that has ended is not followed again
+        tab.page.wait_for_selector("#measure:enabled")
+        tab.page.click("#measure")
+        tab.page.wait_for_selector(".job button")
+        tab.page.reload()
+        tab.page.wait_for_url("**/run/servo-2/")
+        assert tab.wrong == []
+    assert newest(folder / "servo-2").time_s[0] > 50
 
 
 def test_a_measurement_is_cancelled_and_nothing_is_half_written(tmp_path: Path) -> None:

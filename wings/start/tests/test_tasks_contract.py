@@ -87,6 +87,20 @@ def test_a_baseline_is_that_of_the_terminal(tab: Tab, folder: Path, monkeypatch:
     assert Path(downloading.value.path()).read_bytes() == (folder / "baselines/press 3.json").read_bytes()
 
 
+def test_a_run_of_which_no_baseline_is_learned_is_not_offered_for_one(tab: Tab, folder: Path, tmp_path: Path) -> None:
+    log = write_csv(tmp_path / "averaged.csv", signals(4000))
+    roles = "--excitation", "w", "--input", "u", "--output", "y", "--time", "t [s]", "--average"
+    done = livebode("run", log, *roles, "--lines", "50,100,200", "--window", "100", "--out", folder / "averaged")
+    assert done.code == 0, done.err
+    refused = livebode("learn", folder / "averaged", "--out", tmp_path / "no.json")
+    assert refused.code != 0
+    page = task(tab, "learn", "averaged", "monday")
+    assert page.is_disabled('input[value="averaged"]')
+    assert not page.is_checked('input[value="averaged"]')
+    assert page.is_checked('input[value="monday"]')
+    assert "without the average" in page.locator("label", has_text="averaged").inner_text()
+
+
 def test_the_sentence_of_the_command_is_at_the_field_that_mends_it(tab: Tab, folder: Path) -> None:
     for reason in ("", "new bearings"):
         page = task(tab, "learn", "monday")

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import resource
 import socket
+import subprocess
+import sys
 import time
 import tracemalloc
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Iterator
 from pathlib import Path
 from types import SimpleNamespace
 from urllib.parse import quote, urlsplit
@@ -79,6 +82,66 @@ def test_an_upload_that_is_broken_off_leaves_nothing(tmp_path: Path) -> None:
         until(lambda: contents(tmp_path / "runs") == [], "its removal")
         assert send(url, "/api/upload?name=servo.csv", data) == (200, {"recording": "servo.csv"})
     assert (tmp_path / "runs" / "servo.csv").read_bytes() == data
+
+
+@contextlib.contextmanager
+def upload_begun(url: str, folder: Path, data: bytes) -> Iterator[socket.socket]:
+    """Half of an upload has come, and its sender is still there."""
+    parts = urlsplit(url)
+    head = f"POST /api/upload?name=servo.csv HTTP/1.1\r\nHost: {parts.netloc}\r\nOrigin: {url.rstrip('/')}\r\n"
+    with socket.create_connection((parts.hostname, parts.port), PATIENCE_S) as sender:
+        sender.sendall(f"{head}Content-Length: {len(data)}\r\n\r\n".encode() + data[: len(data) // 2])
+        until(lambda: any(folder.glob(".upload.partial-*/servo.csv")), "the first part")
+        yield sender
+
+
+def test_the_part_that_a_killed_server_received_is_removed_at_the_next_start_and_nothing_else(tmp_path: Path) -> None:
+    data = write_servo(tmp_path / "servo.csv").read_bytes()
+    folder = tmp_path / "runs"
+    command = [sys.executable, "-c", "from livebode.cli import main; main()", "view", str(folder), "--port=0"]
+    with subprocess.Popen([*command, "--no-browser"], stderr=subprocess.PIPE, text=True) as server:
+        assert server.stderr is not None
+        url = server.stderr.readline().split()[-1]
+        with upload_begun(url, folder, data):
+            server.kill()
+    (killed,) = folder.iterdir()
+    foreign = {".upload.partial-00000000/notes.txt": b"mine", ".upload.partial-notes": b"mine"}
+    for name, content in foreign.items():
+        (folder / name).parent.mkdir(exist_ok=True)
+        (folder / name).write_bytes(content)
+    (folder / ".upload.partial-11111111").symlink_to(tmp_path)
+    wrong = folder / ".upload.partial-22222222"
+    wrong.mkdir()
+    (wrong / "livebode-upload.json").write_text('{"recording": "../../servo.csv"}')
+    with start_page(folder) as url:
+        assert not killed.exists()
+        with upload_begun(url, folder, data) as sender, start_page(folder):  # another server starts meanwhile
+            sender.sendall(data[len(data) // 2 :])
+            assert b'"servo.csv"' in sender.recv(1 << 16)
+    assert (folder / "servo.csv").read_bytes() == data == (tmp_path / "servo.csv").read_bytes()
+    assert {name: (folder / name).read_bytes() for name in foreign} == foreign
+    assert (folder / ".upload.partial-11111111").is_symlink()
+    assert wrong.exists()
+
+
+def test_an_internal_error_of_the_server_is_a_sentence_on_the_page(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> None:
+        raise ZeroDivisionError
+
+    log = write_servo(tmp_path / "servo.csv")
+    monkeypatch.setattr(Workspace, "free_name", fail)
+    monkeypatch.setattr(Workspace, "path", fail)
+    with start_page(tmp_path / "runs") as url, chromium() as browser:
+        with Tab(browser, url, wait=False) as tab:
+            tab.page.set_input_files("#file", log)
+            tab.page.wait_for_function("() => document.querySelector('.start .wrong').textContent")
+            sentence = tab.page.inner_text(".start .wrong")
+        with Tab(browser, url + "measure?recording=servo.csv", wait=False) as tab:
+            tab.page.wait_for_selector("#notice:visible")
+            assert tab.page.inner_text("#notice") == sentence
+    assert sentence == "Internal error of the server (500); its terminal shows the cause. Try again."
 
 
 def test_a_second_recording_of_the_same_name_replaces_nothing(tmp_path: Path) -> None:

@@ -80,7 +80,9 @@ export class Bode {
     this.nothing = [];
     this.symbol = "";
     /** Units of the quantity times (jω)^n, n = −2 … 2. @type {string[]} */
-    this.units = [];
+    this.unitsSi = [];
+    /** Whether a quantity of the run has other units in the source. */
+    this.ofDrive = false;
     /** @type {Quantity | null} */
     this.quantity = null;
     this.line = 0;
@@ -96,6 +98,12 @@ export class Bode {
 
   get whole() {
     return this.zooming.whole;
+  }
+
+  /** Those that are shown. */
+  get units() {
+    const { inDrive, drive } = this.view;
+    return inDrive && drive ? drive.units : this.unitsSi;
   }
 
   /** The curve that the ring is around. @returns {Curves} */
@@ -119,7 +127,9 @@ export class Bode {
     const of = facts.quantities.find(({ name }) => name === quantity);
     this.quantity = quantity;
     this.symbol = of?.symbol ?? "";
-    this.units = of?.units ?? [];
+    this.unitsSi = of?.units ?? [];
+    this.view.drive = of?.drive ?? null;
+    this.ofDrive = facts.quantities.some(({ drive }) => drive);
     if (this.lines.join() !== facts.frequency_hz.join()) this.aimed = false;
     this.lines = facts.frequency_hz;
     this.grid = facts.grid_hz;

@@ -1,5 +1,6 @@
 // @ts-check
 // The web socket: reconnects with increasing delay, sends requests of the page, distributes the messages.
+import { tr } from "./language.js";
 import { worded } from "./worded.js";
 
 /** @import { News, ClientRequest } from "./messages.js" */
@@ -124,7 +125,20 @@ export async function post(path, body) {
  *
  * @param {Response} answer
  */
-export async function refusal(answer) {
-  const { error, words } = await answer.json();
-  return new Error(worded(words ?? error));
+export const refusal = async (answer) => new Error(refused(answer.status, await answer.text()));
+
+/**
+ * What a person reads of an answer that is none: the words of the server, or where it has failed itself, what to do.
+ *
+ * @param {number} status
+ * @param {string} body
+ */
+export function refused(status, body) {
+  try {
+    const { error, words } = JSON.parse(body);
+    return worded(words ?? error);
+  } catch {
+    if (status < 500 && body) return worded(body);
+    return tr("Internal error of the server ({status}); its terminal shows the cause. Try again.", { status });
+  }
 }

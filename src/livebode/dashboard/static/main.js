@@ -85,12 +85,15 @@ const bode = new Bode(
   },
   {
     margins: () => marginMarks(margins.items),
-    laid: () => drawLegend(),
+    laid: () => {
+      drawLegend();
+      page.dirty.add("rows");
+    },
     modes: () => modes(parameters.items.values()),
   },
 );
-const tracking = new Tracking($("tracking"), $("tracking-lines"));
-const map = new LineMap($("map", HTMLCanvasElement), $("map-hover"));
+const tracking = new Tracking($("tracking"), $("tracking-lines"), bode.view);
+const map = new LineMap($("map", HTMLCanvasElement), $("map-hover"), bode.view);
 const parameters = new Trends(
   $("pane-parameters"),
   (t) => t.model !== "margins",

@@ -11,6 +11,7 @@ import { fixed, hertz, label, mark, plain, signed } from "./words.js";
 
 /** @import { Cells, Shown } from "./map-cells.js" */
 /** @import { History, Named } from "./messages.js" */
+/** @import { View } from "./view.js" */
 /** @typedef {[red: number, green: number, blue: number]} Colour */
 
 /**
@@ -83,10 +84,12 @@ export class LineMap {
   /**
    * @param {HTMLCanvasElement} canvas
    * @param {HTMLElement} hover
+   * @param {View} view units of the Bode plot
    */
-  constructor(canvas, hover) {
+  constructor(canvas, hover, view) {
     this.canvas = canvas;
     this.hover = hover;
+    this.view = view;
     /** @type {Shown} */
     this.what = "level";
     /** @type {"position" | "time"} */
@@ -137,6 +140,13 @@ export class LineMap {
     this.paint();
   }
 
+  // Of what is shown: columns of values of the lines.
+  get values() {
+    const values = this.cells?.of(this.what) ?? [],
+      { aboveDb } = this.view;
+    return this.what === "level" && aboveDb ? values.map((column) => column.map((v) => v + aboveDb)) : values;
+  }
+
   box({ w, h } = { w: this.canvas.clientWidth, h: this.canvas.clientHeight }) {
     return { w, h, left: 48, top: 8, right: w - 78, bottom: h - 38 };
   }
@@ -175,7 +185,7 @@ export class LineMap {
       ctx.fillText(tr("no valid response"), left, top + 20);
       return;
     }
-    const values = cells.of(this.what),
+    const { values } = this,
       flat = values.flat().filter(Number.isFinite);
     const change = this.what === "change",
       edges = this.edges();
@@ -281,7 +291,7 @@ export class LineMap {
     const { cells } = this;
     if (!cells) return;
     const place = cells.low + (i + 0.5) * cells.step;
-    this.hover.textContent = `${cells.moving ? `${fixed(place, 3)} ${this.schedule.unit}` : moment(place, true)} · ${hertz(this.lines[line])} Hz · ${this.value(cells.of(this.what)[i][line])}`;
+    this.hover.textContent = `${cells.moving ? `${fixed(place, 3)} ${this.schedule.unit}` : moment(place, true)} · ${hertz(this.lines[line])} Hz · ${this.value(this.values[i][line])}`;
   }
 
   get words() {

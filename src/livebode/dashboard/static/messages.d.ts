@@ -62,6 +62,12 @@ export interface Waiting extends Axis {
   begun: false;
 }
 
+/** Units of a quantity in the source, as `units`; its values there are `db` above those in SI units. */
+export interface SourceUnits {
+  units: string[];
+  db: number;
+}
+
 /** Facts of a run. */
 export interface Run extends Axis {
   begun: true;
@@ -73,7 +79,14 @@ export interface Run extends Axis {
   window: number;
   quantity: Quantity;
   /** `units` are those of the quantity times (jω)^n, n = −2 … 2. */
-  quantities: { name: Quantity; symbol: string; unit: string; units: string[]; why_not: Words }[];
+  quantities: {
+    name: Quantity;
+    symbol: string;
+    unit: string;
+    units: string[];
+    drive: SourceUnits | null;
+    why_not: Words;
+  }[];
   /** Channels by role. */
   signals: Record<string, string | null>;
   schedule: string;

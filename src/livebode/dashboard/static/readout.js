@@ -6,7 +6,7 @@ import { halfDeg, highDb, lowDb } from "./frames.js";
 import { tr } from "./language.js";
 import { element } from "./make.js";
 import { nameOf } from "./names.js";
-import { angle, bounds, frequency, level } from "./values.js";
+import { angle, bounds, frequency, halfAngle, level } from "./values.js";
 import { fixed, plain, signed } from "./words.js";
 
 /** @import { Bode } from "./bode.js" */
@@ -60,7 +60,7 @@ function rowsOf(found, { view }) {
       element("td", {}, level(db, view)),
       element("td", {}, name === "model" ? "" : around(lowDb(db, reach), db, highDb(db, reach), view)),
       element("td", {}, angle(deg)),
-      element("td", {}, Number.isFinite(reach) ? `± ${fixed(halfDeg(reach), 1)}°` : ""),
+      element("td", {}, Number.isFinite(reach) ? halfAngle(halfDeg(reach)) : ""),
       element("td", {}, Number.isFinite(coherence) ? `γ² ${fixed(coherence, 3)}` : ""),
       element(
         "td",

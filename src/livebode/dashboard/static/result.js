@@ -41,9 +41,9 @@ function fittedWords(bode, parameters) {
   if (modes.length) {
     const words = modes.slice(0, MODES_MAX).map(({ value, damping: ratio }) => `${value} (${damping(ratio)} %)`);
     const more = modes.length - words.length;
-    return tr("Resonances (damping) {list}", {
-      list: [words.join(", "), more ? tr("and {more} more", { more }) : ""].filter(Boolean).join(" "),
-    });
+    const list = words.join(", ");
+    if (!more) return tr("Resonances (damping) {list}", { list });
+    return tr("Resonances (damping) {list} and {more} more", { list, more });
   }
   return [...parameters.items.values()]
     .filter(({ shown }) => shown && Number.isFinite(shown.v) && shown.s > 0)

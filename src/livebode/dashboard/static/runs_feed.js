@@ -19,6 +19,7 @@ import { ask } from "./link.js";
  * @property {number | null} low_hz
  * @property {number | null} high_hz
  * @property {string} estimator
+ * @property {boolean} averaged
  * @property {"ok" | "check" | "alarm" | "open"} tone
  * @property {number} alarms
  * @property {string} model

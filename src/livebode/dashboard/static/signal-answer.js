@@ -7,6 +7,8 @@
  * @typedef {object} Remarked
  * @property {string} name
  * @property {string} unit
+ * @property {string} source_unit
+ * @property {number} factor SI units in one unit of the source
  * @property {number} missing samples
  * @property {boolean} constant
  * @property {number | null} limit value at which it is cut off
@@ -51,4 +53,27 @@ export function answerOf(buffer, spectrum) {
     for (const name of spectrum ? ["hz", "high", "low"] : ["at", "value"])
       channel[name] = taken(name === "at" ? Uint32Array : Float32Array, channel.points);
   return head;
+}
+
+/**
+ * A channel in the units of its source.
+ *
+ * @param {Signal & Spectrum} channel
+ * @returns {Signal & Spectrum}
+ */
+export function inSourceUnits(channel) {
+  const { factor, limit, source_unit: unit } = channel;
+  /** @template {Float32Array | number[] | undefined} V @param {V} values @returns {V} */
+  const scaled = (values) => /** @type {V} */ (values?.map((v) => v / factor));
+  const { value, high, low, lines, detection } = channel;
+  return {
+    ...channel,
+    unit,
+    limit: limit === null ? null : limit / factor,
+    value: scaled(value),
+    high: scaled(high),
+    low: scaled(low),
+    lines: scaled(lines),
+    detection: scaled(detection),
+  };
 }

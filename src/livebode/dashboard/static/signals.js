@@ -3,7 +3,7 @@
 import { moment } from "./clock.js";
 import { tr } from "./language.js";
 import { ask, reason } from "./link.js";
-import { answerOf } from "./signal-answer.js";
+import { answerOf, inSourceUnits } from "./signal-answer.js";
 import { SignalChart } from "./signal-chart.js";
 import { plain } from "./words.js";
 
@@ -131,8 +131,10 @@ export class Signals {
     const { answer, page } = this;
     if (!answer || !page.facts?.begun) return;
     this.lay(this.names);
-    for (const [i, chart] of this.charts.entries())
-      chart.draw(answer, answer.channels[i], rolesOf(page.facts, answer.channels[i].name));
+    for (const [i, chart] of this.charts.entries()) {
+      const channel = answer.channels[i];
+      chart.draw(answer, this.view.inDrive ? inSourceUnits(channel) : channel, rolesOf(page.facts, channel.name));
+    }
     this.say(answer.why_not ? WHY_NOT[answer.why_not] : this.words(answer));
   }
 

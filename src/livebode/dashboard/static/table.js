@@ -5,7 +5,7 @@ import { halfDeg, highDb, lowDb } from "./frames.js";
 import { tr } from "./language.js";
 import { byId as $, element } from "./make.js";
 import { nameOf } from "./names.js";
-import { angle, bounds, frequency, level } from "./values.js";
+import { angle, bounds, frequency, halfAngle, level } from "./values.js";
 import { fixed } from "./words.js";
 
 /** @import { Bode } from "./bode.js" */
@@ -21,7 +21,7 @@ function cells(value, view) {
     known = Number.isFinite(reach) && lowDb(db, reach) > -999;
   return [
     known ? `${level(db, view)} (${bounds(lowDb(db, reach), db, highDb(db, reach), view)})` : level(db, view),
-    Number.isFinite(reach) ? `${angle(deg)} ± ${fixed(halfDeg(reach), 1)}°` : angle(deg),
+    Number.isFinite(reach) ? `${angle(deg)} ${halfAngle(halfDeg(reach))}` : angle(deg),
     Number.isFinite(coherence) ? fixed(coherence, 3) : "",
   ];
 }

@@ -15,6 +15,7 @@ import { hertz, label, mark } from "./words.js";
 
 /** @import { Chart } from "./chart.js" */
 /** @import { History, Named, Run } from "./messages.js" */
+/** @import { View } from "./view.js" */
 
 const COLOURS = 10,
   GAP_S = 2;
@@ -23,10 +24,12 @@ export class Tracking {
   /**
    * @param {HTMLElement} host
    * @param {HTMLElement} chips
+   * @param {View} view units of the Bode plot
    */
-  constructor(host, chips) {
+  constructor(host, chips, view) {
     this.host = host;
     this.chips = chips;
+    this.view = view;
     /** @type {(u: Chart) => void} a chart was built */
     this.onBuilt = () => {};
     /** @type {"magnitude" | "phase"} */
@@ -258,7 +261,9 @@ export class Tracking {
     }
     /** @type {[number[], ...(number | null)[][]]} */
     const data = [x];
-    const deg = this.what === "phase";
+    const deg = this.what === "phase",
+      { aboveDb } = this.view;
+    const level = (/** @type {number} */ c) => rows.magnitude[c] + aboveDb;
     for (const line of this.chosen) {
       /** @param {number} r */
       const cell = (r) => r * rows.columns + line;
@@ -268,12 +273,10 @@ export class Tracking {
           const v = r < 0 ? NaN : of(cell(r));
           return Number.isNaN(v) ? null : v;
         });
-      data.push(value((c) => (deg ? rows.phase[c] : rows.magnitude[c])));
+      data.push(value((c) => (deg ? rows.phase[c] : level(c))));
       if (byPlace) continue;
-      data.push(
-        value((c) => (deg ? rows.phase[c] + halfDeg(rows.reach[c]) : highDb(rows.magnitude[c], rows.reach[c]))),
-      );
-      data.push(value((c) => (deg ? rows.phase[c] - halfDeg(rows.reach[c]) : lowDb(rows.magnitude[c], rows.reach[c]))));
+      data.push(value((c) => (deg ? rows.phase[c] + halfDeg(rows.reach[c]) : highDb(level(c), rows.reach[c]))));
+      data.push(value((c) => (deg ? rows.phase[c] - halfDeg(rows.reach[c]) : lowDb(level(c), rows.reach[c]))));
     }
     this.made?.setData(data);
   }

@@ -66,7 +66,7 @@ export function viewMenu(button, panel, bode, fittedDelayMs) {
     bode.rebuild();
     mark();
   };
-  const mark = () => button.classList.toggle("changed", Boolean(view.words));
+  const mark = () => button.classList.toggle("changed", view.inDrive || Boolean(view.words));
   /** @param {Option} option @param {string} words @param {[string, string][]} choices */
   const choice = (option, words, choices) => {
     const select = element(
@@ -78,7 +78,7 @@ export function viewMenu(button, panel, bode, fittedDelayMs) {
     select.addEventListener("change", () =>
       apply(() => {
         // Another magnitude: a range that was chosen for the previous one shows nothing.
-        if (option === "power") bode.zooming.heights.fill(null);
+        if (option === "power" || option === "units") bode.zooming.heights.fill(null);
         if (option === "phase") bode.zooming.heights[1] = null;
         view.choose(option, select.value);
       }),
@@ -98,7 +98,17 @@ export function viewMenu(button, panel, bode, fittedDelayMs) {
     };
     delay.addEventListener("change", () => remove(delay.valueAsNumber));
     const fitted = fittedDelayMs();
+    const { unitsSi } = bode,
+      at = view.power + 2;
+    /** @param {string} words @param {string[] | undefined} units */
+    const named = (words, units) => (units?.[at] ? `${words}: ${units[at]}` : words);
+    /** @type {[value: string, words: string][]} */
+    const units = [
+      ["si", named(tr("SI"), unitsSi)],
+      ["drive", named(tr("of the drive"), view.drive?.units)],
+    ];
     panel.replaceChildren(
+      ...(bode.ofDrive ? [choice("units", tr("units of magnitude and signals"), units)] : []),
       ...CHOICES.map(([option, words, choices]) => choice(option, words, choices)),
       choice("power", tr("derivative or integral"), powers),
       element("label", {}, element("span", {}, tr("delay removed, in ms")), delay),

@@ -2,9 +2,10 @@
 // How the Bode plot shows its curves: units, scales, delay, derivative or integral. Chosen in the address.
 import { chosen, remember } from "./address.js";
 import { tr } from "./language.js";
-import { fixed } from "./words.js";
+import { fixed, signed } from "./words.js";
 
 /** @import { Curve, Numbers } from "./curves.js" */
+/** @import { SourceUnits } from "./messages.js" */
 /** @typedef {{db: Numbers, deg: Numbers}} Viewing Magnitude and phase of a curve in the view. */
 
 export const OPTIONS = /** @type {const} */ ({
@@ -13,6 +14,7 @@ export const OPTIONS = /** @type {const} */ ({
   magnitude: ["db", "absolute"],
   phase: ["unwrapped", "wrapped"],
   power: ["0", "1", "2", "-1", "-2"],
+  units: ["si", "drive"],
 });
 /** @typedef {keyof typeof OPTIONS} Option */
 
@@ -24,11 +26,13 @@ const inAddress = (option) => `bode-${option}`;
 export class View {
   constructor() {
     /** @type {Record<Option, string>} */
-    this.options = { frequency: "log", unit: "hz", magnitude: "db", phase: "unwrapped", power: "0" };
+    this.options = { frequency: "log", unit: "hz", magnitude: "db", phase: "unwrapped", power: "0", units: "si" };
     for (const option of /** @type {Option[]} */ (Object.keys(OPTIONS)))
       this.options[option] = chosen(inAddress(option), OPTIONS[option][0], OPTIONS[option]);
     const ms = Number(chosen(inAddress("delay"), "0"));
     this.delayMs = Math.abs(ms) <= DELAY_MS_MAX ? ms : 0;
+    /** Of the quantity that is shown, if they are not SI units. @type {SourceUnits | null} */
+    this.drive = null;
   }
 
   /**
@@ -62,6 +66,15 @@ export class View {
     return this.options.magnitude === "absolute";
   }
 
+  get inDrive() {
+    return this.options.units === "drive";
+  }
+
+  // How far the displayed magnitudes are above those in SI units.
+  get aboveDb() {
+    return this.inDrive && this.drive ? this.drive.db : 0;
+  }
+
   // Displayed units of angular frequency or frequency in one Hz.
   get perHz() {
     return this.options.unit === "rad" ? 2 * Math.PI : 1;
@@ -75,6 +88,7 @@ export class View {
   // What was done to the curves, for a title; empty if nothing was.
   get words() {
     const found = [];
+    if (this.inDrive && this.drive) found.push(tr("units of the drive: SI {db} dB", { db: signed(this.drive.db, 2) }));
     if (this.power > 0) found.push(tr("multiplied by (jω)^{n}", { n: String(this.power) }));
     if (this.power < 0) found.push(tr("divided by (jω)^{n}", { n: String(-this.power) }));
     if (this.delayMs) found.push(tr("delay of {ms} ms removed", { ms: fixed(this.delayMs, 3) }));
@@ -86,14 +100,15 @@ export class View {
    * A curve in this view. Its relative bounds are those of the curve: the factor is exact.
    *
    * @param {Curve} curve
-   * @param {boolean} ratio of two curves, in which factor and delay cancel
+   * @param {boolean} ratio of two curves, in which factors and delay cancel
    * @returns {Viewing}
    */
   of(curve, ratio = false) {
     const { hz, db, deg, reach } = curve,
       power = ratio ? 0 : this.power,
+      aboveDb = ratio ? 0 : this.aboveDb,
       delayS = ratio ? 0 : this.delayMs / 1000;
-    const level = power ? hz.map((f, i) => db[i] + 20 * power * Math.log10(2 * Math.PI * f)) : db;
+    const level = power || aboveDb ? hz.map((f, i) => db[i] + aboveDb + 20 * power * Math.log10(2 * Math.PI * f)) : db;
     /** @type {Numbers} */
     let angle = deg;
     if (power || delayS) angle = hz.map((f, i) => deg[i] + 90 * power + 360 * f * delayS);

@@ -53,9 +53,20 @@ export function pair(value, bound) {
 /** @param {string} unit as it is shown after a number */
 export const afterNumber = (unit) => (unit === "deg" || unit === "°" ? "°" : unit && ` ${unit}`);
 
-/** @param {number} value */
+/**
+ * Decimal places with which a bound has two digits, and no fewer than `least`.
+ *
+ * @param {number} bound
+ * @param {number} least
+ */
+export const places = (bound, least) =>
+  bound > 0 && Number.isFinite(bound)
+    ? Math.min(Math.max(BOUND_DIGITS - 1 - Math.floor(Math.log10(bound)), least), PLACES_MAX)
+    : least;
+
+/** @param {number} value what rounds to zero has no minus sign */
 export const signed = (value, digits = 1) =>
-  Number.isFinite(value) ? `${value < 0 ? "−" : "+"}${fixed(Math.abs(value), digits)}` : "–";
+  Number.isFinite(value) ? `${Number(value.toFixed(digits)) < 0 ? "−" : "+"}${fixed(Math.abs(value), digits)}` : "–";
 
 /** @param {number} f */
 export function hertz(f) {

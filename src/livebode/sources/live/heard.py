@@ -13,13 +13,14 @@ from typing import Any, Protocol, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.core import Block, Channel, LivebodeError, SourceError
+from livebode.core import Block, Channel, SourceError
 from livebode.plugins import loaded, named
 from livebode.sources.live.address import parse_address
 from livebode.sources.live.fields import number_fields
 from livebode.sources.live.opening import make_source
 from livebode.sources.live.settings import SourceKeys, SourceSettings
 from livebode.sources.live.source import LiveSource
+from livebode.sources.quantities import kind_by_name
 from livebode.sources.units import split_unit
 
 LISTEN_S = 3.0
@@ -29,6 +30,7 @@ _TICK_S = 0.05
 _NICE = (1.0, 1.25, 2.0, 2.5, 4.0, 5.0, 8.0)
 _NEAR = 0.03  # of a rate: arrivals within three seconds do not give it better
 _BYTES_SHOWN = 24
+_NEITHER = "what arrives is neither samples for livebode nor JSON"
 
 
 @dataclass(frozen=True)
@@ -130,13 +132,12 @@ def survey_messages(settings: SourceKeys, seconds: float) -> Survey:
     other.retains_unusable, other.unusable = True, deque(maxlen=_MESSAGES_MAX)
     try:
         other.open()
-    except SourceError as error:
+    except SourceError:
         if not other.unusable:
             raise
-        trouble = error
     finally:
         other.close()
-    return survey_of(str(settings.url), list(other.unusable), trouble)
+    return survey_of(str(settings.url), list(other.unusable), _NEITHER)
 
 
 def heard_channels(source: LiveSource, seconds: float) -> Survey:
@@ -160,7 +161,7 @@ def heard_channels(source: LiveSource, seconds: float) -> Survey:
     return Survey(tuple(heard), settings, Block(data, labels, rate_hz) if data.size else None)
 
 
-def survey_of(url: str, messages: Sequence[tuple[float, bytes]], trouble: LivebodeError) -> Survey:
+def survey_of(url: str, messages: Sequence[tuple[float, bytes]], trouble: object) -> Survey:
     """Fields of messages of JSON with the times of their arrival; without any, what is wrong with them."""
     parsed: list[Any] = []
     for _, message in messages:
@@ -174,7 +175,8 @@ def survey_of(url: str, messages: Sequence[tuple[float, bytes]], trouble: Livebo
             values.setdefault(path, []).append(numbers)
     values = {path: parts for path, parts in values.items() if all(parts)}
     if not values:
-        return Survey((), {"url": url}, None, unusable_words(messages, trouble))
+        why = "the messages have no field with numbers" if parsed else trouble
+        return Survey((), {"url": url}, None, unusable_words(messages, why))
     began, ended = messages[0][0], messages[-1][0]
     span_s = max(ended - began, 1e-9)
     heard = []
@@ -224,17 +226,23 @@ def nice_rate(rate_hz: float) -> float:
 
 
 def channel_names(paths: Sequence[str]) -> dict[str, str]:
-    """A name for each path: its last word, or where two would be the same the whole path.
+    """A name for each path: its last words that say what is measured, else the last; the whole path if two are alike.
 
-    >>> channel_names(["drive.torque", "axes[0].vel", "axes[1].vel"])
-    {'torque': 'drive.torque', 'axes_0_vel': 'axes[0].vel', 'axes_1_vel': 'axes[1].vel'}
+    >>> channel_names(["drive.torque.set", "drive.gen.exc", "axes[0].vel", "axes[1].vel"])
+    {'torque_set': 'drive.torque.set', 'exc': 'drive.gen.exc', 'axes_0_vel': 'axes[0].vel', 'axes_1_vel': 'axes[1].vel'}
     """
-    short = [path.rpartition(".")[2] for path in paths]
+    short = [_telling(path.split(".")) for path in paths]
     whole = ["_".join(path.replace("[", ".").replace("]", "").split(".")) for path in paths]
     return {
         (last if short.count(last) == 1 and "[" not in last else full): path
         for path, last, full in zip(paths, short, whole)
     }
+
+
+def _telling(words: Sequence[str]) -> str:
+    """The shortest end of a path whose words name a kind of quantity; its last word if none does."""
+    ends = ("_".join(words[begin:]) for begin in reversed(range(len(words))))
+    return next((end for end in ends if kind_by_name(end)), words[-1])
 
 
 def unusable_words(messages: Collection[tuple[float, bytes]], trouble: object) -> str:

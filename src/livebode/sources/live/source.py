@@ -389,7 +389,9 @@ class LiveSource(ABC):
         return SourceError(
             "no-samples",
             Message("no samples arrived {when} ({why})", when=when, why=self._trouble),
-            Message("check that the machine is on and sends"),
+            Message("compare the sender with [source]")
+            if self.unusable
+            else Message("check that the machine is on and sends"),
             address=address,
             timeout_s=self.settings.timeout_s,
             cause=cause,

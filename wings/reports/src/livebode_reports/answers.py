@@ -30,7 +30,7 @@ def answers(of: ReportData) -> tuple[Answer, ...]:
     asked = {result.limit.quantity for result in of.accepted}
     quantities = [quantity for quantity in _quantities(of) if _as_limit(quantity) not in asked]
     if not quantities and not limited:
-        return tuple(_peak(of.of.response))
+        return tuple(_peak(of.shown.mean))
     return (*limited, *(Answer(quantity_name(name), value) for name, _, value in by_importance(quantities)))
 
 

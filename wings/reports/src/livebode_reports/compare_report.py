@@ -94,8 +94,8 @@ class Comparison:
         """Tables for the terminal: changes of parameters and margins, and the ten lines that differ most certainly."""
         d = self.differences.overall
         changed = [
-            f"  {quantity_name(c.name):28}{c.before[0]:>12.5g} → {c.after[0]:<12.5g}{c.amount:>+12.3g} ± "
-            f"{c.bound:<10.2g}{c.unit}" + "  changed" * c.significant
+            f"  {quantity_name(c.name):28}{number(c.before[0], '.5g'):>12} → "
+            f"{number(c.after[0], '.5g'):<12}{_amount(c)}{c.unit}" + "  changed" * c.significant
             for table in (self.changes.parameters, self.changes.margins)
             for c in by_importance(table)
         ]
@@ -351,6 +351,12 @@ class Comparison:
                 message = recorded(monitoring.get("words", {}), monitoring["message"])
             parts.append(Paragraph(f"{when}: {worded(message)}"))
         return Section(tr("Events"), tuple(parts))
+
+
+def _amount(c: QuantityChange) -> str:
+    """A change with its bound; below a hundredth of that it is 0."""
+    text, around = with_bound(c.amount, c.bound)
+    return f"{'0' if abs(c.amount) < c.bound / 100 else signed(text):>12} ± {around:<10}"
 
 
 def _ratio_columns(ratio: complex, bound: float) -> str:

@@ -20,10 +20,10 @@ from livebode.analysis import (
     loop_report,
 )
 from livebode.configuration import FitSection, LoopSection, ReportSection, recorded_configuration, recorded_report
-from livebode.core import LivebodeError, Responses, date_and_time
+from livebode.core import Gain, LivebodeError, Model, Response, Responses, SourceUnit, date_and_time
 from livebode.fitting import Fit
 from livebode.language import listed, tr, worded
-from livebode.records import RunRecord
+from livebode.records import RunRecord, source_unit_in
 from livebode_reports.acceptance import LimitEvidence, LimitResult, accepted
 from livebode_reports.events import EventSummary
 from livebode_reports.parameter_track import Track, tracks
@@ -87,6 +87,15 @@ class RunData:
         return {role: listed(name) if isinstance(name, list) else str(name) for role, name in signals.items()}
 
 
+@dataclass(frozen=True, eq=False)
+class ShownResponse:
+    """The mean of a run, its responses over time, and the fitted model, in one unit."""
+
+    mean: Response
+    overview: Responses
+    model: Model | None
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ReportData(RunData):
     """The data of a run with one response, or of one entry of a matrix run.
@@ -117,6 +126,20 @@ class ReportData(RunData):
     def entry(self) -> str:
         """The entry of a matrix run, "output ← input"; empty of an ordinary run."""
         return entry_title(self.run)
+
+    @cached_property
+    def drive_unit(self) -> SourceUnit | None:
+        """The unit of pictures and tables if it is that of the drive; None for SI units."""
+        return source_unit_in(self.run.found) if self.header.units == "drive" else None
+
+    @cached_property
+    def shown(self) -> ShownResponse:
+        """What pictures and tables show of the response."""
+        mean, overview, fit, unit = self.of.response, self.of.overview, self.fit, self.drive_unit
+        if unit is None:
+            return ShownResponse(mean, overview, fit)
+        model = None if fit is None else Gain(unit.factor) * fit
+        return ShownResponse(unit.converted(mean), unit.converted(overview), model)
 
     @cached_property
     def accepted(self) -> tuple[LimitResult, ...]:

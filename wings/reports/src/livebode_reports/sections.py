@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import isfinite
+from math import isfinite, log10
 from typing import Any
 
 import numpy as np
@@ -40,29 +40,35 @@ _TRACES_MAX, _TRACED = 10, 500  # lines that are drawn as traces, and responses 
 
 def average(of: ReportData) -> Picture:
     """The mean with its bounds and the fitted model: the picture of the first page."""
-    mean = of.of.response
+    shown = of.shown
     names = (of.channels["input"], of.channels["output"]) if {"input", "output"} <= of.channels.keys() else None
     caption = tr("Measured: {what}, with 95 % bounds.", what=worded(of.of.words))
     if of.fit:
         caption += " " + tr("Dashed: the {model} model fitted to it.", model=worded(of.fit.model.name))
-    return Picture("bode", {"responses": of.of.overview, "mean": mean, "names": names, "fitted": of.fit}, caption)
+    if unit := of.drive_unit:
+        caption += " " + tr(
+            "Units of the drive: 1 {si} = {factor:.5g} {unit}, {db:+.2f} dB; parameters and limits are in SI units.",
+            si=of.run.found["unit"], factor=unit.factor, unit=unit.unit, db=20 * log10(unit.factor),
+        )  # fmt: skip
+    data = {"responses": shown.overview, "mean": shown.mean, "names": names, "fitted": shown.model}
+    return Picture("bode", data, caption)
 
 
 def response(of: ReportData) -> Section:
     """The mean at each line, with its bounds."""
-    mean = of.of.response
+    mean = of.shown.mean
     frequency = mean.lines.frequency_hz
     rows = [
         (number(f, "g"), *polar, number(c, ".4f") if isfinite(c) else "—", share(n, of.of.count))
         for f, polar, c, n in zip(frequency, polar_rows(mean), mean.coherence, of.of.valid)
     ]
-    headings = ("Hz", f"dB{_re(of)}", "± dB", tr("degrees"), tr("± degrees"), tr("coherence γ²"), tr("valid"))
+    headings = ("Hz", f"dB{_re(mean.unit)}", "± dB", tr("degrees"), tr("± degrees"), tr("coherence γ²"), tr("valid"))
     return Section(tr("Frequency response"), (line_table(headings, rows),))
 
 
 def tracking(of: ReportData) -> Section:
     """Magnitude of the lines over time and over the schedule, if there is one."""
-    shown = of.of.overview
+    shown = of.shown.overview
     if len(shown.lines) <= _TRACES_MAX:
         shown = shown[:: -(-len(shown) // _TRACED)]
     thinned = _drawn(of, len(shown))
@@ -263,8 +269,8 @@ def _drawn(of: ReportData, kept: int) -> str:
     return tr(" (thinned: {kept:,} of {all:,} responses)", kept=kept, all=of.of.count) if kept < of.of.count else ""
 
 
-def _re(of: ReportData) -> str:
-    return tr(" re 1 {unit}", unit=of.run.found["unit"]) if of.run.found["unit"] else ""
+def _re(unit: str) -> str:
+    return tr(" re 1 {unit}", unit=unit) if unit else ""
 
 
 def _plain(value: Any) -> str:

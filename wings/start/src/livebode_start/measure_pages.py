@@ -14,12 +14,13 @@ from starlette.responses import JSONResponse, RedirectResponse, Response
 from starlette.routing import BaseRoute, Route
 
 from livebode.core import ServerError, write_whole, writing
-from livebode.dashboard import Board, Order, error_answer, upload
+from livebode.dashboard import Board, Order, error_answer, json_object, upload
 from livebode.language import Message
 from livebode.records import to_json
 from livebode_start.jobs import JobOrder, Jobs
+from livebode_start.listening import Listening, stem_of
 from livebode_start.preview import POINTS_MAX
-from livebode_start.recordings import Choices, OpenedRecording, OpenedRecordings, proposed
+from livebode_start.recordings import Choices, OpenedRecording, OpenedRecordings
 from livebode_start.results import Results
 from livebode_start.uploads import UPLOAD_BYTES_MAX, Uploads
 from livebode_start.workspace import Workspace
@@ -52,6 +53,7 @@ class MeasurePages:
         self._workspace, self._jobs = workspace, jobs
         self._access, self._file, self._order = board.access, file, order
         self._uploads, self._recordings = Uploads(workspace), OpenedRecordings()
+        self._listening = Listening()
         # A reader of its own: a long recording does not delay the list of runs.
         self._reader = ThreadPoolExecutor(1, thread_name_prefix="livebode recordings")
         self._waiting = 0
@@ -65,6 +67,7 @@ class MeasurePages:
             Route("/api/recording", partial(self._known, self.recording)),
             Route("/api/preview", partial(self._known, self.preview)),
             Route("/api/upload", self.upload, methods=["POST"]),
+            Route("/api/listen", self.listen, methods=["POST"]),
             Route("/api/configuration", self.configuration, methods=["POST"]),
             Route("/api/measure", self.measure, methods=["POST"]),
         ]
@@ -116,6 +119,14 @@ class MeasurePages:
         size_bytes = int(length) if length is not None else None
         return _json({"recording": await self._uploads.receive(name, size_bytes, upload(request))})
 
+    async def listen(self, request: Request) -> Response:
+        """Listen to the address that an operator names; nothing is written."""
+        data = await self._order(request, CHOICES_BYTES_MAX)
+        if isinstance(data, Response):
+            return data
+        address = json_object(data).get("address")
+        return _json(await self._listening.listen(address if isinstance(address, str) else ""))
+
     async def configuration(self, request: Request) -> Response:
         """The axis.toml of an operator's choices; nothing is written."""
         data = await self._order(request, CHOICES_BYTES_MAX)
@@ -137,6 +148,7 @@ class MeasurePages:
 
             def prepare() -> None:
                 with writing(path):
+                    path.parent.mkdir(parents=True, exist_ok=True)  # nothing was sent to it yet, with a live source
                     write_whole(path, answer["text"].encode())
 
             arguments = ("run", path.name, f"--out={stem}")
@@ -145,19 +157,22 @@ class MeasurePages:
         return _json(await self._read(job))
 
     def close(self) -> None:
-        """Stop the reading thread."""
+        """Stop the threads."""
+        self._listening.close()
         self._reader.shutdown(wait=False, cancel_futures=True)
 
     def _opened(self, name: object, rate_hz: float | None) -> OpenedRecording:
-        return self._recordings.open(self._workspace.path(name), rate_hz)
+        if (heard := self._listening.heard(name)) is not None:
+            return self._recordings.of_heard(heard, rate_hz)
+        return self._recordings.open(self._workspace.path(name), str(name), rate_hz)
 
     def _proposed(self, choices: Choices) -> tuple[str, dict[str, Any]]:
         """Name of configuration and run, and the answer to the page."""
         opened = self._opened(choices.recording, choices.rate_hz)
         if choices.baseline:
             Results(self._workspace.directory).check("baselines", choices.baseline)
-        stem = self._workspace.free_stem(Path(opened.name).stem)
-        answer = proposed(opened, choices).plain(opened.name)
+        stem = self._workspace.free_stem(Path(opened.name).stem if opened.heard is None else stem_of(opened.name))
+        answer = opened.proposed(choices).plain(opened.name)
         return stem, answer | {"command": f"livebode run {stem}.toml --out={stem}", "file": f"{stem}.toml"}
 
     async def _read(self, job: Callable[[], T]) -> T:

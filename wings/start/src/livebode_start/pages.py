@@ -14,6 +14,7 @@ from livebode_start.job_pages import JobPages
 from livebode_start.jobs import Jobs
 from livebode_start.measure_pages import MeasurePages
 from livebode_start.task_pages import TaskPages
+from livebode_start.uploads import remove_abandoned
 from livebode_start.workspace import Workspace
 
 
@@ -30,6 +31,7 @@ class StartPages:
 
     def __init__(self, directory: Path) -> None:
         self._workspace = Workspace(directory)
+        remove_abandoned(self._workspace.directory)
         self._jobs = Jobs(self._workspace.directory)
         self._measure: MeasurePages | None = None
 

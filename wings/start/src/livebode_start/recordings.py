@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
@@ -24,12 +25,14 @@ from livebode.preparation import (
     tables_of,
 )
 from livebode.sources import Log, open_log
+from livebode.sources.live import Survey
+from livebode_start.listening import log_of_heard, shown
 from livebode_start.preview import Overview
 
 OPEN_MAX = 4
 """Recordings in memory."""
 _CHANNELS_MAX = 500
-_NAME_MAX = 500
+_NAME_MAX = 2000
 _ESTIMATORS = "joint", "direct", "lpm", "welch"
 Role = Literal["excitation", "input", "output", "schedule"]
 
@@ -48,7 +51,7 @@ class Choices(BaseModel):
     Attributes
     ----------
     recording
-        Name of the file.
+        Name of the file, or the address that was listened to.
     rate_hz
         Samples per second, of a recording without a rate.
     signals
@@ -91,21 +94,25 @@ class Choices(BaseModel):
 
 @dataclass
 class OpenedRecording:
-    """A recording of the workspace in memory.
+    """A recording of the workspace, or what came from an address, in memory.
 
     Attributes
     ----------
     name
-        Of its file.
-    rate_hz
-        As given, for one without a rate; else None.
+        Of its file as the workspace offers it, or the address.
+    source
+        Its section [source].
     log
         What reads it.
+    heard
+        What the page shows of each channel of a live source; None of a file.
     """
 
     name: str
-    rate_hz: float | None
+    source: Mapping[str, Any]
     log: Log
+    heard: Mapping[str, Any] | None = None
+    _newest: tuple[Choices, ProposedConfiguration] | None = field(default=None, init=False, repr=False)
 
     @cached_property
     def proposals(self) -> Proposals:
@@ -132,10 +139,11 @@ class OpenedRecording:
             "recording": self.name,
             "format": log.format,
             "rate_hz": log.rate_hz,
-            "rate_given": self.rate_hz is not None,
+            "rate_given": "rate_hz" in self.source,
             "begin_s": log.origin_s,
             "end_s": log.origin_s + self.stop / log.rate_hz,
             "gaps": 0 if timing is None else timing.gaps,
+            **(self.heard or {}),
             "channels": [
                 {
                     "name": channel.name,
@@ -154,6 +162,18 @@ class OpenedRecording:
                 for role, guess in self.guesses.items()
             },
         }
+
+    def proposed(self, choices: Choices) -> ProposedConfiguration:
+        """The configuration of these choices, found and checked as `livebode inspect --out` does it.
+
+        Raises
+        ------
+        LivebodeError
+            If the recording contradicts them, or they do not suffice.
+        """
+        if self._newest is None or self._newest[0] != choices:  # the lines of a long recording take seconds
+            self._newest = choices, _found(self, choices)
+        return self._newest[1]
 
     @cached_property
     def guesses(self) -> dict[str, Guess]:
@@ -178,10 +198,10 @@ class ProposedConfiguration:
         return {
             "text": self.settled.text(recording),
             "lines": lines or None,
-            "lines_found": comments.get(("lines", "frequencies"), ""),
-            "window_found": comments.get(("lines", "window"), ""),
+            "lines_found": for_page(comments.get(("lines", "frequencies"), "")),
+            "window_found": for_page(comments.get(("lines", "window"), "")),
             "estimator": self.estimator,
-            "estimator_reason": self.estimator_reason,
+            "estimator_reason": for_page(self.estimator_reason),
             "average": self.average,
             "model": self.model,
             "doubts": [for_page(doubt) for doubt in self.settled.doubts],
@@ -194,43 +214,61 @@ class OpenedRecordings:
     def __init__(self) -> None:
         self._opened: OrderedDict[Any, OpenedRecording] = OrderedDict()
 
-    def open(self, path: Path, rate_hz: float | None) -> OpenedRecording:
-        """The recording of a file, read again if the file has changed; LivebodeError if it cannot be read."""
+    def open(self, path: Path, name: str, rate_hz: float | None) -> OpenedRecording:
+        """The recording of a file, read again if the file has changed; LivebodeError if it cannot be read.
+
+        `name` is its path relative to the configuration.
+        """
         status = path.stat()
-        key = path.name, status.st_mtime_ns, status.st_size, rate_hz
+        source: dict[str, Any] = {"log": name} | ({} if rate_hz is None else {"rate_hz": rate_hz})
+        return self._retained(
+            (name, status.st_mtime_ns, status.st_size, rate_hz),
+            lambda: OpenedRecording(name, source, open_log(path, rate_hz=rate_hz)),
+        )
+
+    def of_heard(self, heard: Survey, rate_hz: float | None) -> OpenedRecording:
+        """The samples of a live source as a recording."""
+
+        def opened() -> OpenedRecording:
+            log, source = log_of_heard(heard, rate_hz)
+            return OpenedRecording(str(heard.source["url"]), source, log, shown(heard))
+
+        return self._retained((heard, rate_hz), opened)
+
+    def _retained(self, key: object, opened: Callable[[], OpenedRecording]) -> OpenedRecording:
         if key not in self._opened:
-            self._opened[key] = OpenedRecording(path.name, rate_hz, open_log(path, rate_hz=rate_hz))
+            self._opened[key] = opened()
             while len(self._opened) > OPEN_MAX:
                 self._opened.popitem(last=False)
         self._opened.move_to_end(key)
         return self._opened[key]
 
 
-def proposed(opened: OpenedRecording, choices: Choices) -> ProposedConfiguration:
-    """The configuration of these choices, found and checked as `livebode inspect --out` does it.
-
-    Raises
-    ------
-    LivebodeError
-        If the recording contradicts them, or they do not suffice.
-    """
+def _found(opened: OpenedRecording, choices: Choices) -> ProposedConfiguration:
     signals: dict[str, str] = {role: name for role, name in choices.signals.items() if name}
     _check_signals(signals)
     log = chosen_part(opened.log, choices.begin_s, choices.end_s, 0, _no_periods)
     estimator, reason = suitable_estimator(log, signals)
     estimator = choices.estimator or estimator
     average = "schedule" not in signals and not choices.baseline if choices.average is None else choices.average
-    model = choices.model or suitable_model(opened.proposals, signals, estimator)
-    source = {
-        "log": opened.name, "rate_hz": choices.rate_hz, "from": choices.begin_s, "to": choices.end_s
-    }  # fmt: skip
+    model = choices.model or suitable_model(log, signals, estimator)
+    source = {**opened.source, "from": choices.begin_s, "to": choices.end_s}
     tables = tables_of(source, signals, estimator=estimator, average=average, model=model)
     if choices.baseline:
         tables["monitoring"] = {"baseline": f"baselines/{choices.baseline}.json"}
     if choices.lines is not None:
         tables["lines"] = choices.lines.model_dump()
     reasons = {role: _reason(opened, role, name) for role, name in signals.items()}
-    return ProposedConfiguration(settled(log, tables, reasons), estimator, reason, average, model)
+    result = settled(log, tables, reasons)
+    if opened.heard is not None and "lines" not in result.tables:
+        raise UsageError(
+            "missing",
+            Message("nothing repeats in {reference}, and a live source needs lines and a window",
+                    reference=signals.get("excitation") or signals["input"]),
+            Message("enter both"),
+            argument="lines",
+        )  # fmt: skip
+    return ProposedConfiguration(result, estimator, reason, average, model)
 
 
 def _reason(opened: OpenedRecording, role: str, name: str) -> str:

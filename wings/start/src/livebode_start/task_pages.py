@@ -68,10 +68,10 @@ class TaskPages:
 
     async def tasks(self, request: Request) -> Response:
         """The tasks that are offered, and the jobs that are remembered."""
-        if self._board.access.role_of(request) is None:
+        if (role := self._board.access.role_of(request)) is None:
             return _unknown()
         jobs = [job.plain() | {"output": ""} for job in self._jobs.listed()]
-        return _json({"tasks": offered(), "jobs": jobs})
+        return _json({"tasks": offered(), "jobs": jobs, "role": role})
 
     async def task(self, request: Request) -> Response:
         """The fields of a task, and the results that are here."""

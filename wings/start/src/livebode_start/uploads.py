@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import json
 import os
 import shutil
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Iterator
 from pathlib import Path
 
 from starlette.requests import ClientDisconnect
 
-from livebode.core import ServerError, output_files
+from livebode.core import LivebodeError, ServerError, output_files, remove_empty, remove_files, write_whole
 from livebode.language import Message
+from livebode.records import Lock, read_bytes
 from livebode.sources import open_file
 from livebode_start.workspace import Workspace, harmless_name
 
@@ -23,6 +25,9 @@ RESERVE_BYTES = 256 << 20
 UPLOADS_MAX = 4
 """At the same time."""
 _PIECE_BYTES = 1 << 20
+_MARK, _MARK_BYTES_MAX = "livebode-upload.json", 4096
+"""File beside the part that has come: livebode wrote both."""
+_KIND = "upload"
 
 
 class Uploads:
@@ -68,7 +73,7 @@ class Uploads:
         name = self._workspace.free_name(harmless_name(name), self._names)
         self._names.add(name)
         try:
-            with output_files(self._workspace.directory, "upload") as partial:
+            with output_files(self._workspace.directory, _KIND) as partial, _marked(partial, name):
                 _check_room(partial, size_bytes)
                 await _write(partial / name, parts)
                 with self._workspace.short_names(partial):
@@ -77,6 +82,37 @@ class Uploads:
         finally:
             self._names.discard(name)
         return name
+
+
+def remove_abandoned(directory: Path) -> None:
+    """Remove what servers that were killed had received until then.
+
+    Only what the mark beside it names, and only where no other server is still receiving; anything else remains.
+    """
+    for partial in sorted(directory.glob(f".{_KIND}.partial-*")):
+        with contextlib.suppress(LivebodeError, OSError, ValueError, KeyError, TypeError):
+            if partial.is_symlink():
+                continue
+            lock = Lock(partial)
+            try:
+                name = json.loads(read_bytes(partial, _MARK, _MARK_BYTES_MAX))["recording"]
+                if name == harmless_name(name):
+                    remove_files(partial, [name, _MARK])
+            finally:
+                lock.release()
+            remove_empty(partial)
+
+
+@contextlib.contextmanager
+def _marked(partial: Path, name: str) -> Iterator[None]:
+    """The mark of a recording that comes; the lock is that of this process, which ends with it."""
+    lock = Lock(partial)
+    try:
+        write_whole(partial / _MARK, json.dumps({"recording": name}).encode())
+        yield
+        remove_files(partial, [_MARK])
+    finally:
+        lock.release()
 
 
 def _checked_size(size_bytes: int | None) -> int:

@@ -7,6 +7,7 @@ import re
 import unicodedata
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
+from functools import cache
 from itertools import count
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Any
@@ -19,6 +20,7 @@ NAME_BYTES_MAX = 100
 """Of a name without its ending: run directory, configuration and outbox are named after it."""
 _ENDING_LETTERS_MAX = 12
 _FILES_MAX = 1000
+_BESIDE = "../"
 _FORBIDDEN = re.compile(r'[<>:"/\\|?*]')
 _DEVICE = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)
 _OWN = (".toml", ".json", ".jsonl", ".sqlite")  # a run.json would make the directory a run
@@ -49,7 +51,8 @@ def harmless_name(text: str) -> str:
 class Workspace:
     """A directory with recordings, their configurations and runs.
 
-    A name from outside is looked for among the names in it, and never becomes a path by itself.
+    If it is in the working directory, as `runs` is where livebode was started, the recordings beside it are also
+    offered, as ../NAME. A name from outside is looked for among the offered names, and never becomes a path by itself.
 
     Parameters
     ----------
@@ -59,23 +62,23 @@ class Workspace:
 
     def __init__(self, directory: Path) -> None:
         self.directory = directory.absolute()
+        self._working = Path.cwd()
 
     def files(self) -> dict[str, os.stat_result]:
-        """The plain files by name, without links and hidden ones."""
-        try:
-            with os.scandir(self.directory) as entries:
-                plain = [e for e in entries if not e.name.startswith(".") and e.is_file(follow_symlinks=False)]
-                return {entry.name: entry.stat(follow_symlinks=False) for entry in plain}
-        except OSError:  # it is missing, or may not be read: there is nothing to choose from
-            return {}
+        """The plain files by name, without links and hidden ones; those beside the directory only if recordings."""
+        own = _plain_files(self.directory)
+        # Of a link, ".." in a configuration would be another directory.
+        if self.directory.parent != self._working or self.directory.is_symlink():
+            return own
+        beside = _plain_files(self._working).items()
+        return own | {_BESIDE + name: status for name, status in beside if _is_recording(name)}
 
     def recordings(self) -> list[dict[str, Any]]:
         """Name, bytes and seconds since 1970 of each file with the ending of a recording, the newest first."""
-        endings = tuple({ending for table in tables("readers") for format_ in table for ending in format_.suffixes})
         rows: list[dict[str, Any]] = [
             {"name": name, "size_bytes": status.st_size, "written": status.st_mtime}
             for name, status in self.files().items()
-            if name.lower().endswith(endings)
+            if _is_recording(name)
         ]
         return sorted(rows, key=lambda row: row["written"], reverse=True)[:_FILES_MAX]
 
@@ -86,7 +89,8 @@ class Workspace:
             raise ServerError(
                 "file-unknown", f"there is no recording {shown!r}", Message("reload the page"), name=shown
             )
-        return self.directory / name
+        # Not through the directory, which may be missing.
+        return self._working / name.removeprefix(_BESIDE) if name.startswith(_BESIDE) else self.directory / name
 
     def free_name(self, name: str, taken: Collection[str] = ()) -> str:
         """This name, or one with a number, that neither a file nor `taken` has."""
@@ -110,15 +114,34 @@ class Workspace:
 
     @contextmanager
     def short_names(self, directory: Path | None = None) -> Iterator[None]:
-        """Errors inside it name files by their names in this directory; default: the workspace."""
-        prefix = f"{directory or self.directory}{os.sep}"
+        """Errors inside it name files as in this directory; default: the workspace."""
+        prefixes = {f"{directory or self.directory}{os.sep}": "", f"{self._working}{os.sep}": _BESIDE}
         try:
             yield
         except LivebodeError as error:
             for part in ("message", "remedy", "place"):
-                if prefix in (text := getattr(error, part)):
-                    setattr(error, part, text.replace(prefix, ""))
+                for prefix, short in prefixes.items():
+                    if prefix in (text := getattr(error, part)):
+                        setattr(error, part, text.replace(prefix, short))
             raise
+
+
+@cache
+def _endings() -> tuple[str, ...]:
+    return tuple({ending for table in tables("readers") for format_ in table for ending in format_.suffixes})
+
+
+def _is_recording(name: str) -> bool:
+    return name.lower().endswith(_endings())
+
+
+def _plain_files(directory: Path) -> dict[str, os.stat_result]:
+    try:
+        with os.scandir(directory) as entries:
+            plain = [e for e in entries if not e.name.startswith(".") and e.is_file(follow_symlinks=False)]
+            return {entry.name: entry.stat(follow_symlinks=False) for entry in plain}
+    except OSError:  # it is missing, or may not be read: there is nothing to choose from
+        return {}
 
 
 def _numbered(stem: str, ending: str = "") -> Iterator[str]:

@@ -3,6 +3,7 @@
 import { followJob } from "./job_progress.js";
 import { tr, trn } from "./language.js";
 import { post, reason } from "./link.js";
+import { heardTable, listen } from "./live_source.js";
 import { byId as $, element } from "./make.js";
 import { Roles } from "./measure_roles.js";
 import { Signals } from "./measure_signals.js";
@@ -28,23 +29,30 @@ import { plain } from "./words.js";
  * @property {Record<Role, Guess>} roles
  * @property {string[]} estimators
  * @property {string[]} models
+ * @property {import("./live_source.js").Heard[]} [heard] of a live source
+ * @property {boolean} [rate_measured] by the arrival of what another program sends
  */
 /**
  * @typedef {object} Configuration
  * @property {string} text
  * @property {{frequencies: string, window: number} | null} lines
- * @property {string} lines_found
- * @property {string} window_found
+ * @property {Words} lines_found
+ * @property {Words} window_found
  * @property {string} estimator
- * @property {string} estimator_reason
+ * @property {Words} estimator_reason
  * @property {boolean} average
  * @property {string} model
  * @property {Words[]} doubts
  * @property {string} command
  */
 
-const SETTLE_MS = 250;
-const recording = new URLSearchParams(location.search).get("recording") ?? "";
+/** @typedef {{job: string, run: string}} Started */
+
+const SETTLE_MS = 250,
+  LOOK_MS = 500;
+const query = new URLSearchParams(location.search),
+  recording = query.get("recording") ?? "",
+  rateGiven = Number(query.get("rate_hz")) || null;
 const frequencies = $("frequencies", HTMLInputElement),
   window_ = $("window", HTMLInputElement),
   estimator = $("estimator", HTMLSelectElement),
@@ -71,11 +79,11 @@ async function open(rateHz) {
   try {
     show(await json("/api/recording", { recording, ...(rateHz === null ? {} : { rate_hz: String(rateHz) }) }));
     complain(null);
-    $("rate").hidden = true;
   } catch (error) {
     $("facts").textContent = "";
     complain(error);
     $("rate").hidden = !(error instanceof Error && /rate/i.test(error.message));
+    $("again").hidden = !recording.includes("://");
   }
 }
 
@@ -89,13 +97,15 @@ function show(facts) {
     ];
   $("facts").textContent = words.join(" · ");
   $("steps").hidden = $("next").hidden = false;
+  if (facts.heard) showHeard(facts, facts.heard);
   const signals = new Signals($("signals"), $("more", HTMLButtonElement), facts, complain);
   const roles = new Roles($("slots"), facts.channels, facts.roles, () => {
     signals.mark(roles.chosen);
     settle();
   });
   for (const name of facts.estimators) estimator.append(element("option", { value: name }, name));
-  for (const name of facts.models) model.append(element("option", { value: name }, name));
+  for (const name of facts.models)
+    model.append(element("option", { value: name }, name === "none" ? tr("none") : name));
   from.placeholder = plain(facts.begin_s, 6);
   to.placeholder = plain(facts.end_s, 6);
 
@@ -130,24 +140,32 @@ function show(facts) {
       $("ready").textContent = reason(error);
       $("ready").className = "wrong";
       $("toml").hidden = true;
+      $("lines-found").textContent = $("window-found").textContent = "";
     }
   }
 
-  async function run() {
+  /** @param {() => Promise<Started>} start */
+  async function run(start) {
     measure.disabled = true;
     $("ready").textContent = tr("Measuring …");
     $("ready").className = "";
     try {
-      const { job, run } = await post("/api/measure", choices());
+      const { job, run } = await start();
+      // The address has the job, so that it is followed again after a reload.
+      history.replaceState(null, "", `#${new URLSearchParams({ job, run })}`);
       $("ready").hidden = measure.hidden = true;
-      const ended = await followJob($("job"), job, tr("Measuring …"));
-      if (ended.state === "done") {
+      // A live measurement lasts until somebody finishes it, on the page of its run.
+      const ends = [followJob($("job"), job, tr("Measuring …")), ...(facts.heard ? [recorded(run)] : [])];
+      const ended = await Promise.race(ends);
+      forgetJob();
+      if (ended === null || ended.state === "done") {
         location.assign(`/run/${encodeURIComponent(run)}/`);
         return;
       }
-      $("job").replaceChildren();
       throw new Error(ended.state === "stopped" ? tr("The measurement was cancelled.") : ended.sentence);
     } catch (error) {
+      forgetJob();
+      $("job").replaceChildren();
       $("ready").hidden = measure.hidden = measure.disabled = false;
       $("ready").textContent = reason(error);
       $("ready").className = "wrong";
@@ -168,7 +186,7 @@ function show(facts) {
   }
 
   signals.onZoom = () => {
-    $("use").hidden = signals.whole;
+    $("use").hidden = signals.whole || facts.heard !== undefined;
   };
   $("use").addEventListener("click", () => {
     [from.value, to.value] = signals.span.map((s) => String(Math.round(s * facts.rate_hz) / facts.rate_hz));
@@ -181,7 +199,7 @@ function show(facts) {
     used();
     settle();
   });
-  measure.addEventListener("click", run);
+  measure.addEventListener("click", () => run(() => post("/api/measure", choices())));
   json("/api/task", { task: "learn" })
     .then(({ results }) => {
       for (const { name } of results) baseline.append(element("option", { value: name }, name));
@@ -189,7 +207,40 @@ function show(facts) {
     .catch(complain);
   signals.mark(roles.chosen);
   signals.fetch();
+  const { job, run: name } = Object.fromEntries(new URLSearchParams(location.hash.slice(1)));
   propose();
+  if (job && name) run(async () => ({ job, run: name }));
+}
+
+const forgetJob = () => history.replaceState(null, "", location.pathname + location.search);
+
+/**
+ * What came from a live source, whose rate can be corrected; a measurement of it has no span.
+ *
+ * @param {Facts} facts
+ * @param {import("./live_source.js").Heard[]} heard
+ */
+function showHeard(facts, heard) {
+  $("heard").hidden = $("again").hidden = false;
+  $("rate").hidden = !facts.rate_measured;
+  $("channels").replaceChildren(heardTable(heard));
+  $("rate-hz", HTMLInputElement).value = String(facts.rate_hz);
+  $("rate-set").textContent = tr("Set");
+  $("span").hidden = true;
+}
+
+/**
+ * Until a live source is recorded: its run is in the list.
+ *
+ * @param {string} run
+ */
+async function recorded(run) {
+  for (;;) {
+    /** @type {import("./runs_feed.js").Answer} */
+    const { runs } = await json("/api/runs", { since: 0 });
+    if (runs.some(({ name }) => name === run)) return null;
+    await new Promise((done) => setTimeout(done, LOOK_MS));
+  }
 }
 
 /** @param {HTMLInputElement} field */
@@ -207,10 +258,10 @@ function fill(found) {
     frequencies.value = found.lines?.frequencies ?? "";
     window_.value = found.lines ? String(found.lines.window) : "";
   }
-  $("lines-found").textContent = found.lines_found;
-  $("window-found").textContent = found.window_found;
+  $("lines-found").textContent = worded(found.lines_found);
+  $("window-found").textContent = worded(found.window_found);
   estimator.value = found.estimator;
-  $("estimator-found").textContent = found.estimator_reason;
+  $("estimator-found").textContent = worded(found.estimator_reason);
   average.checked = found.average;
   model.value = found.model;
   $("text").textContent = found.text;
@@ -219,7 +270,7 @@ function fill(found) {
   const doubts = found.doubts.map((doubt) => worded(doubt));
   $("ready").textContent = doubts.length
     ? doubts.join(" ")
-    : [found.lines_found, tr("ready to measure")].filter(Boolean).join(" · ");
+    : [worded(found.lines_found), tr("ready to measure")].filter(Boolean).join(" · ");
   $("ready").className = doubts.length ? "doubt" : "";
   measure.disabled = false;
 }
@@ -234,6 +285,20 @@ $("copy").addEventListener("click", async () => {
 });
 $("rate").addEventListener("submit", (event) => {
   event.preventDefault();
-  open(Number($("rate-hz", HTMLInputElement).value));
+  location.search = new URLSearchParams({ recording, rate_hz: $("rate-hz", HTMLInputElement).value }).toString();
 });
-open(null);
+$("again").addEventListener("click", async () => {
+  const button = $("again", HTMLButtonElement);
+  button.disabled = true;
+  $("facts").textContent = tr("listening for 3 s …");
+  try {
+    const { usable, trouble } = await listen(recording);
+    if (!usable) throw new Error(worded(trouble));
+    location.reload();
+  } catch (error) {
+    complain(error);
+    $("facts").textContent = "";
+    button.disabled = false;
+  }
+});
+open(rateGiven);

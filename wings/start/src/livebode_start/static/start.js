@@ -1,12 +1,12 @@
 // @ts-check
 // Above the list of runs: a place to drop a recording, and those that are in the directory.
 import { tr } from "./language.js";
-import { reason } from "./link.js";
+import { reason, refused } from "./link.js";
+import { addressForm } from "./live_source.js";
 import { element } from "./make.js";
 import { json } from "./runs_feed.js";
 import { size } from "./runs_words.js";
 import { taskBar } from "./task_bar.js";
-import { worded } from "./worded.js";
 
 /** @import { Workspace } from "./messages.js" */
 /** @typedef {{name: string, size_bytes: number, written: number}} Recording */
@@ -23,6 +23,7 @@ export const workspace = (place) => {
     status = element("p", { class: "wrong", role: "alert" }),
     bar = element("progress", { max: 1, hidden: true, "aria-label": tr("Sending the recording") }),
     list = element("ul", { class: "recordings" }),
+    more = element("button", { type: "button", hidden: true }),
     hint = element("small", { id: "limit" });
   const drop = element(
     "label",
@@ -35,17 +36,19 @@ export const workspace = (place) => {
   const here = element(
     "div",
     { class: "here", hidden: true },
-    element("h3", {}, tr("Recordings in this directory")),
+    element("h3", {}, tr("or a recording that is here")),
     list,
+    more,
   );
   const card = element(
     "section",
     { class: "card start", "aria-labelledby": "start-title", hidden: true },
-    element("h2", { id: "start-title" }, tr("Measure: from a recording to its Bode plot")),
+    element("h2", { id: "start-title" }, tr("Measure: from a recording or a live source to its Bode plot")),
     input,
     drop,
-    here,
     status,
+    addressForm(measuring),
+    here,
   );
   place.append(card);
   const tasks = taskBar(place);
@@ -67,13 +70,16 @@ export const workspace = (place) => {
     const { recordings, bytes_max: most } = await json("/api/recordings", {});
     hint.textContent = tr("CSV, MAT, HDF5, TDMS, MDF, Parquet, WAV and others; at most {size}", { size: size(most) });
     here.hidden = !recordings.length;
-    list.replaceChildren(
-      ...recordings
-        .slice(0, SHOWN)
-        .map((/** @type {Recording} */ { name, size_bytes: bytes }) =>
-          element("li", {}, element("a", { href: measuring(name) }, name), element("small", {}, size(bytes))),
-        ),
+    const rows = recordings.map((/** @type {Recording} */ { name, size_bytes: bytes }) =>
+      element("li", {}, element("a", { href: measuring(name) }, name), element("small", {}, size(bytes))),
     );
+    list.replaceChildren(...rows.slice(0, SHOWN));
+    more.hidden = rows.length <= SHOWN;
+    more.textContent = tr("Show all {count}", { count: rows.length });
+    more.onclick = () => {
+      list.replaceChildren(...rows);
+      more.hidden = true;
+    };
   }
 
   input.addEventListener("change", () => input.files?.[0] && send(input.files[0]));
@@ -125,9 +131,8 @@ function uploaded(file, bar) {
   return new Promise((resolve, reject) => {
     request.addEventListener("error", () => reject(new Error(tr("The server does not answer."))));
     request.addEventListener("load", () => {
-      const answer = JSON.parse(request.responseText || "{}");
-      if (request.status === 200) resolve(answer.recording);
-      else reject(new Error(worded(answer.words ?? answer.error ?? "")));
+      if (request.status === 200) resolve(JSON.parse(request.responseText).recording);
+      else reject(new Error(refused(request.status, request.responseText)));
     });
     request.send(file);
   });

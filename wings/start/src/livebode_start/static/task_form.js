@@ -184,11 +184,21 @@ export function showRuns(host, task, most, runs, chosen, onChange) {
   const whole = runs.filter((run) => run.state !== "broken");
   if (most > 2) {
     const boxes = whole.map((run) => {
-      const box = element("input", { type: "checkbox", value: run.name, onchange: onChange });
-      box.checked = chosen.includes(run.name);
+      const box = element("input", { type: "checkbox", value: run.name, onchange: onChange, disabled: run.averaged });
+      box.checked = chosen.includes(run.name) && !run.averaged;
       return box;
     });
-    const lines = boxes.map((box) => element("label", { class: "box" }, box, box.value));
+    const lines = boxes.map((box, number) =>
+      element(
+        "label",
+        { class: "box" },
+        box,
+        box.value,
+        ...(whole[number].averaged
+          ? [element("small", {}, tr("averaged over all periods: measure its recording again without the average"))]
+          : []),
+      ),
+    );
     host.append(
       element("fieldset", { class: "group boxes" }, element("legend", {}, tr("Runs of the healthy machine")), ...lines),
     );

@@ -1,4 +1,4 @@
-"""Series: one signal of a Python session, from an array, a list, or a column of pandas, Polars or xarray."""
+"""NamedSamples: one signal of a Python session, from an array, a list, or a column of pandas, Polars or xarray."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _NANOSECONDS_PER_S = 1_000_000_000
 
 
 @dataclass(frozen=True, eq=False)
-class Series:
+class NamedSamples:
     """Samples of one signal, and what its object says about them.
 
     Attributes
@@ -49,7 +49,7 @@ class Series:
         return "time [s]", passed / _NANOSECONDS_PER_S
 
 
-def series_of(**signals: ArrayLike) -> dict[str, Series]:
+def series_of(**signals: ArrayLike) -> dict[str, NamedSamples]:
     """The signals by their argument; all of one length.
 
     Parameters
@@ -95,13 +95,13 @@ def series_of(**signals: ArrayLike) -> dict[str, Series]:
     return found
 
 
-def _one(argument: str, data: Any) -> Series:
+def _one(argument: str, data: Any) -> NamedSamples:
     values = _values(argument, data)
     index, index_name = _index(data)
     name = getattr(data, "name", None)
     attributes = getattr(data, "attrs", None)
     unit = attributes.get("units", "") if isinstance(attributes, Mapping) else ""
-    return Series(values, name if isinstance(name, str) else "", str(unit), index, index_name)
+    return NamedSamples(values, name if isinstance(name, str) else "", str(unit), index, index_name)
 
 
 def _values(argument: str, data: Any) -> Floats:
