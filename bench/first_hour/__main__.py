@@ -1,8 +1,8 @@
 """`python -m bench.first_hour`: what a person does in the first hour with a machine, in a terminal and in a browser.
 
 Eleven tasks, each from the files or senders that a person has to a result that is compared with the truth of the
-machine: seconds and commands in the terminal; seconds, clicks and words to read in headless Chromium. `--only TEXT`: the
-tasks whose name contains it.
+machine: seconds and commands in the terminal; seconds, clicks and reading in headless Chromium.
+`--only TEXT`: the tasks whose name contains it.
 """
 
 from __future__ import annotations

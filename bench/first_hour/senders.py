@@ -60,9 +60,11 @@ def sending(send: Callable[[int], object], period_s: float) -> Iterator[None]:
 @contextmanager
 def garbage(port: int) -> Iterator[None]:
     """Datagrams of another program, 50 per second."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
-        with sending(lambda _: sender.sendto(GARBAGE, ("127.0.0.1", port)), 0.02):
-            yield
+    with (
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender,
+        sending(lambda _: sender.sendto(GARBAGE, ("127.0.0.1", port)), 0.02),
+    ):
+        yield
 
 
 @contextmanager

@@ -1,6 +1,6 @@
 """A servo that livebode did not make: two masses and a shaft, discretised exactly by SciPy, with a PI velocity loop.
 
-`python -m bench.servo DIR` writes its recording in the units and the spelling of several drives.
+`python -m bench.first_hour.servo DIR` writes its recording in the units and the spelling of several drives.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ class Servo:
         return {"time": np.arange(count) / RATE_HZ, "excitation": excitation, "torque": torque, "speed": speed}
 
     def _discrete(self) -> tuple[Samples, Samples]:
-        """Speeds of both masses and twist of the shaft, one sample later: of themselves, and of a torque that is held."""
+        """Speeds and twist one sample later, from themselves and from a torque that is held."""
         c, k, jm, jl = self.damping, self.stiffness, self.motor, self.load
         system = np.zeros((4, 4))
         system[:3] = [[-c / jm, c / jm, -k / jm, 1 / jm], [c / jl, -c / jl, k / jl, 0], [1, -1, 0, 0]]
@@ -83,7 +83,8 @@ def write_recordings(folder: Path, seconds: float = 20.0) -> None:
     """The same recording as several drives would have written it."""
     t, w, u, y = Servo().record(seconds).values()
     rpm, torque_percent = y * 30 / np.pi, 100 / RATED_TORQUE_N_M
-    write_csv(folder / "si.csv", ["time [s]", "excitation [N m]", "torque [N m]", "speed [rad/s]"], [t, w, u, y])
+    si = ["time [s]", "excitation [N m]", "torque [N m]", "speed [rad/s]"]
+    write_csv(folder / "si.csv", si, [t, w, u, y])
     write_csv(folder / "rpm.csv", ["t_s", "exc_Nm", "torque_Nm", "speed_rpm"], [t, w, u, rpm])
     write_csv(
         folder / "percent.csv",

@@ -367,6 +367,9 @@ NOT_HERE = {
     "`livebode run --force`": "a damaged run: tests/records/test_file_damage_fault.py",
     "export, by SQL": "an output-only run: wings/modes/tests/test_command_truth.py",
     "--help": "every command has it: tests/meta/test_command_line.py",
+    "configuration by livebode inspect": "a live source: tests/sources/test_foreign_messages_truth.py",
+    "directory that this writes: livebode run": "in tests/cli/test_next_step_truth.py",
+    "see its results: livebode view": "serves until it is ended; wings and the dashboard's tests start it",
     "by {}": "the command line is composed; `run --output-only` is executed above",
 }
 """Advice of errors that is not executed here, and why."""

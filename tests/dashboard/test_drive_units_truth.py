@@ -129,6 +129,8 @@ def test_a_live_run_remembers_them_too(tmp_path: Path) -> None:
 def test_the_page_shows_the_response_in_the_units_of_the_drive(recorded: Recorded, tab: Tab) -> None:
     response = recorded.newest
     si = 20 * np.log10(np.abs(response.value))
+    tab.until("map.cells")
+    level = tab.numbers("map.values.flat()")
     model, tracked = drawn(tab, "model"), tab.numbers("tracking.made.data[1]")
     np.testing.assert_allclose(drawn(tab, "measured"), si, **CLOSE)
     choose(tab, "drive")
@@ -139,6 +141,8 @@ def test_the_page_shows_the_response_in_the_units_of_the_drive(recorded: Recorde
         above = 20 * np.log10(recorded.factor)
         np.testing.assert_allclose(drawn(tab, "model") - model, above, atol=1e-4)
         np.testing.assert_allclose(tab.numbers("tracking.made.data[1]") - tracked, above, atol=1e-4)
+        tab.until("map.cells")
+        np.testing.assert_allclose(tab.numbers("map.values.flat()") - level, above, atol=1e-4)
         label = tab.js("bode.charts[0].axes[1].label(bode.charts[0])")
         assert label.endswith(f"re 1 {recorded.unit}")
         # The phase and the parameters are what they were; a link shows the same view.

@@ -218,6 +218,31 @@ def test_runs_without_a_clock_are_listed_apart_and_shown_where_a_search_finds_no
         assert tab.wrong == []
 
 
+def test_the_header_of_the_list_and_of_the_trends_fits_a_phone(browser: Browser, url: str) -> None:
+    for path, ready in (("", "#rows [data-run]"), ("trends", ".trend-card canvas")):
+        with Tab(browser, url + path, wait=False, viewport=PHONE) as tab:
+            tab.page.locator(ready).first.wait_for()
+            tab.page.evaluate("() => { document.getElementById('count').textContent = '1234 runs'; }")
+            assert tab.page.evaluate("document.documentElement.scrollWidth") <= PHONE["width"], path
+
+
+def test_a_quantity_that_two_models_have_is_shown_with_the_model(browser: Browser, url: str) -> None:
+    with Tab(browser, url + "trends#find=day", wait=False) as tab:
+        tab.page.locator("[data-name='two-mass/resonance'] canvas").wait_for()
+        shared = tab.page.evaluate(
+            """async () => {
+              const { quantitiesOf } = await import("/static/trends_data.js");
+              const point = (model, name, unit) => [model, name, unit, 1, 0.1, 0.9, 1.1, 0, 5, 3];
+              const runs = ["a", "b"].map((name) => ({ name, begun: 5 }));
+              const trends = new Map([
+                ["a", { points: [point("two-mass", "resonance", "Hz"), point("two-mass", "Keff", "N/m")], alarms: [] }],
+                ["b", { points: [point("two-mass-gain", "resonance", "Hz")], alarms: [] }]]);
+              return quantitiesOf(runs, trends, false).quantities.filter((q) => q.model).map((q) => [q.name, q.shared]);
+            }"""
+        )
+    assert shared == [["resonance", True], ["resonance", True], ["Keff", False]]
+
+
 def test_both_pages_have_no_english_outside_of_their_catalogue(browser: Browser, url: str) -> None:
     answer = json.dumps(asdict(pseudo()) | {"languages": {"en": "English"}})
     data = {

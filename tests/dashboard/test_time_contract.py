@@ -404,6 +404,22 @@ def test_a_lost_server_greys_the_plots_and_says_since_when(browser: Browser, tmp
         watched.dashboard.__enter__()
 
 
+def test_a_server_that_ends_with_its_run_is_not_lost(browser: Browser, tmp_path: Path) -> None:
+    """As after Ctrl-C: the run ends, and the server directly behind it."""
+    with Watched(tmp_path / "run") as watched, Tab(browser, watched.url, wait=False) as tab:
+        watched.go(2000)
+        tab.until("window.livebode?.bode.curves.measured")
+        verdict = tab.page.inner_text("#verdict")
+        watched.end()
+        tab.until("page.health?.ending || document.getElementById('status-text').textContent.includes('recorded')")
+        watched.dashboard.__exit__()
+        tab.page.locator("#lost", has_text="The run and its server ended at").wait_for()
+        assert "recorded" in tab.page.inner_text("#status-text")
+        assert tab.page.inner_text("#verdict") == verdict
+        assert tab.js("getComputedStyle(document.getElementById('magnitude')).filter") == "none"
+        watched.dashboard.__enter__()
+
+
 def test_a_new_run_ends_the_zoom_of_the_one_before(browser: Browser, tmp_path: Path) -> None:
     found = Dashboard(ServerSettings("127.0.0.1", 0))
     hub = found.hub("axis")

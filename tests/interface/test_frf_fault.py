@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import livebode
-from livebode.core import LivebodeError
+from livebode.core import LivebodeError, SignalError, with_bound
+from livebode.interface import write_examples
 
 N = 4000
 
@@ -143,3 +145,19 @@ def test_the_remedies_work() -> None:
 def test_an_unknown_keyword_is_an_error() -> None:
     with pytest.raises(TypeError, match="rate"):
         livebode.frf(*signals(), rate=4000)
+
+
+def test_of_noise_that_the_input_does_not_follow_the_sentence_names_the_input() -> None:
+    lines = livebode.Lines.parse("4:199:3", 4000, 4000)
+    u = np.tile(livebode.multisine(lines, 1.0), 20)
+    with pytest.raises(SignalError, match="or 'u' does not follow it; check the roles"):
+        livebode.frf(np.random.default_rng(0).standard_normal(len(u)), u, np.roll(u, 3), fs=4000)
+
+
+def test_what_a_fit_and_a_recording_show_are_numbers_to_their_bounds_and_what_is_in_it(tmp_path: Path) -> None:
+    write_examples(["standstill"], tmp_path)
+    log = livebode.open(tmp_path / "standstill.csv")
+    assert "csv, 8000 samples at 4000 Hz" in repr(log)
+    fit = livebode.fit(livebode.frf(log["w"], log["u"], log["velocity"], fs=log.rate_hz), "two-mass")
+    row = next((value, bound) for name, value, bound, _ in fit.rows() if name == "resonance")
+    assert f"resonance = {' ± '.join(with_bound(*row))} Hz" in repr(fit)

@@ -248,3 +248,16 @@ def test_an_acceleration_over_a_force_is_not_exchanged_and_without_a_name_at_mos
             assert (channels[1].name == "ai2" and not channels[1].unit) or not exchanged
             doubted += bool(exchanged)
     assert doubted > 20
+
+
+def test_a_window_that_is_no_multiple_of_the_period_is_answered_with_the_period(tmp_path: Path) -> None:
+    lines = Lines.parse("4:199:3", 4000, 4000)
+    w = np.tile(multisine(lines, 1.0), 8)
+    y = np.convolve(w, np.exp(-np.arange(200) / 20))[: len(w)]
+    columns = {"t": np.arange(len(w)) / 4000, "w": w, "u": w - 0.1 * y, "y": y}
+    write_parquet(tmp_path / "log.parquet", columns)
+    roles = ("--excitation", "w", "--input", "u", "--output", "y", "--out", tmp_path / "run")
+    refused = livebode("run", tmp_path / "log.parquet", *roles, "--window", 400)
+    assert refused.code == 2
+    assert "it repeats every 4000 samples: choose a multiple of them as window" in refused.err
+    assert livebode("run", tmp_path / "log.parquet", *roles, "--window", 4000).code == 0

@@ -180,6 +180,11 @@ def test_a_channel_knows_its_unit_in_the_file(tmp_path: Path) -> None:
     assert [(c.unit, c.source_unit, round(c.factor, 6)) for c in log.channels[1:]] == [
         ("N m", "Ncm", 0.01), ("N m", "Nm", 1.0), ("rad/s", "U/min", 0.10472),
     ]  # fmt: skip
+    export = EXPORTS["without units"]
+    stated = open_log(export.write(tmp_path / "stated.csv"), units=dict(export.units))
+    assert [(c.unit, c.source_unit, c.factor) for c in stated.channels[2:]] == [
+        ("N m", "mNm", 1e-3), ("rad/s", "rad/s", 1.0),
+    ]  # fmt: skip
     raw = np.concatenate([block.data for block in log.as_written().blocks(["Istdrehzahl"])], axis=1)
     read = np.concatenate([block.data for block in log.blocks(["Istdrehzahl"])], axis=1)
     np.testing.assert_allclose(read, raw * pi / 30, rtol=1e-15)

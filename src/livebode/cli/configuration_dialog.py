@@ -122,7 +122,7 @@ def _heard(url: str, rate: float | None) -> tuple[Recorded, dict[str, Any]]:
         raise SourceError(
             "no-samples",
             found.trouble or "the channels have no samples in common",
-            "compare it with what livebode reads (docs/how-to/live.md), and correct the address or the sender",
+            "docs/how-to/live.md describes what is read; correct the address or the sender",
             address=url,
         ).at(url)
     block = found.block if rate is None else replace(found.block, rate_hz=rate)
@@ -251,7 +251,7 @@ class Dialog:
             still = "schedule" not in signals
             answers["average"] = _agrees(console, "Average over all periods, for a standstill", still)
         if "fit" not in answers:
-            suits = suitable_model(self._proposals.log, signals, answers["estimator"])
+            suits = suitable_model(self._proposals, signals, answers["estimator"])
             answers["fit"] = _ask(console, "Model to fit to the responses", suits, ("none", "auto", *named("models")))
         estimator, average, model = (answers[key] for key in ("estimator", "average", "fit"))
         return tables_of(source, signals, estimator=estimator, average=average, model=model)

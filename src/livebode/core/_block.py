@@ -35,7 +35,8 @@ class Channel:
         The quantity that it is: torque, force, current, velocity, position, acceleration or other. Default: the one
         that the unit shows, "other" for a unit that is not recognised.
     written
-        Unit in the source, where it is spelled otherwise or is another one; else empty.
+        Unit in the source, where it is spelled otherwise or is another one; else empty. Of a channel without a unit,
+        the one that the configuration states.
     factor
         SI units in one unit of the source: the samples are its values times this.
 
@@ -232,8 +233,9 @@ class SourceUnit:
     Examples
     --------
     >>> speed = Channel("n", "rad/s", written="rpm", factor=0.10472)
-    >>> SourceUnit.of(speed, Channel("M", "N m", written="%", factor=0.024))
-    SourceUnit(unit='rpm/(%)', factor=0.22918258212375859)
+    >>> in_source = SourceUnit.of(speed, Channel("M", "N m", written="%", factor=0.024))
+    >>> in_source.unit, round(in_source.factor, 5)
+    ('rpm/(%)', 0.22918)
     """
 
     unit: str

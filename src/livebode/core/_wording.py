@@ -39,6 +39,8 @@ def with_bound(value: float, bound: float) -> tuple[str, str]:
 
     >>> with_bound(501234.5, 1234.5), with_bound(0.0028, 1.2e-5), with_bound(3.0, float("nan"))
     (('501200', '1200'), ('0.002800', '0.000012'), ('3', 'not known'))
+    >>> with_bound(-1e-9, 2e-4), with_bound(2e-14, 1.6e-7)
+    (('0.00000', '0.00020'), ('0', '1.6e-07'))
     >>> with_bound(-4.16, 250.0)
     ('0', '250')
     """
@@ -52,4 +54,5 @@ def with_bound(value: float, bound: float) -> tuple[str, str]:
     places = f".{max(digits, 0)}f"
     # A row of zeros is not legible.
     half = number(bound, ".2g") if digits > _PLACES_MAX else number(round(bound, digits), places)
-    return number(round(value, digits) + 0.0, places), half  # a value within its bound is 0, not −0
+    shown = round(value, digits) + 0.0  # no minus sign before a zero
+    return "0" if shown == 0 and digits > _PLACES_MAX else number(shown, places), half

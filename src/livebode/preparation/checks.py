@@ -201,12 +201,13 @@ def check_some_valid(responses: int, valid: int, tracker: Follower) -> None:
             window=window,
         )
     if responses and tracker.settings.estimator == "lpm":
-        name = tracker.settings.channel(tracker.settings.method.reference)
+        name, driven = tracker.settings.channel(tracker.settings.method.reference), tracker.settings.channel("input")
+        follows = "" if driven in (None, name) else f"; or {driven!r} does not follow it"
         raise SignalError(
             "no-valid-response",
             f"none of {responses} responses is valid: the power of {name!r} is at single tones, or as smooth over "
-            "frequency as a transient, from which 'lpm' cannot tell it",
-            "record an excitation that repeats, or noise or a chirp that has power in a whole band",
+            f"frequency as a transient, from which 'lpm' cannot tell it{follows}",
+            "check the roles, or record an excitation that repeats, or noise or a chirp that has power in a whole band",
             reason="not-separable",
             responses=responses,
             window=window,

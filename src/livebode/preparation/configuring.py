@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import tomli_w
 
@@ -18,13 +18,15 @@ from livebode.preparation.nonperiodic import suits_lpm
 from livebode.preparation.plan import Recorded, beginning, roles_in_doubt
 from livebode.sources import Log
 
+if TYPE_CHECKING:
+    from livebode.preparation.proposal import Proposals
+
 _NOT_REPEATING = ("signal.not-periodic", "signal.too-short")
+_FITTED = ("velocity", "position")
 _PERIODIC = ("joint", "direct")
 _FITTED_LINES_MIN = 4
 """Complex values for the six free parameters of two masses with an unknown gain."""
 _COLUMN = 28  # of the comments
-_FITTED = ("velocity", "position")
-_MOTIONS = (*_FITTED, "acceleration")
 
 Tables = dict[str, dict[str, Any]]
 
@@ -70,16 +72,18 @@ def suitable_estimator(log: Recorded, signals: Mapping[str, str]) -> tuple[str, 
     return "joint", Message("for a machine in a control loop, whose excitation repeats")
 
 
-def suitable_model(log: Recorded, signals: Mapping[str, str], estimator: str) -> str:
-    """The model to fit for these roles: "auto" for a drive, to its motion, with enough lines; else "none"."""
-    kinds = {channel.name: channel.stated_kind for channel in log.channels}
+def suitable_model(proposals: Proposals, signals: Mapping[str, str], estimator: str) -> str:
+    """The model to fit for these roles: "auto" for a velocity or a position with enough lines, else "none".
+
+    None with a schedule: a baseline of fits needs more windows at each place than a few strokes have.
+    """
+    kinds = {channel.name: channel.kind for channel in proposals.channels}
     reference = signals.get("excitation") or signals.get("input")
-    if reference is None or kinds.get(signals["output"]) not in _FITTED or estimator not in _PERIODIC:
-        return "none"
-    if kinds.get(signals.get("input", "")) in _MOTIONS:  # a reference: its loop is no machine
+    fitted = kinds.get(signals.get("output", "")) in _FITTED and estimator in _PERIODIC and "schedule" not in signals
+    if reference is None or not fitted:
         return "none"
     try:
-        found = recognise(beginning(log, reference), log.rate_hz)
+        found = recognise(beginning(proposals.log, reference), proposals.log.rate_hz)
     except LivebodeError:  # a run gives the reason
         return "none"
     return "auto" if len(found.lines) >= _FITTED_LINES_MIN else "none"

@@ -10,7 +10,7 @@ from itertools import combinations
 import numpy as np
 
 from livebode.arrays import Complex, Floats
-from livebode.core import ANY_EXCITATION, Channel, SignalError
+from livebode.core import ANY_EXCITATION, Channel, LivebodeError, SignalError
 from livebode.estimation import Role, Settings
 from livebode.language import Message
 from livebode.preparation._role_spectra import ChannelQuantities, RoleSpectra, role_spectra
@@ -131,9 +131,13 @@ def suspicions(signals: Mapping[Role, Floats], settings: Settings, channels: Ite
         return found
     quantities = ChannelQuantities(channels)
     rules: tuple[Callable[[RoleSpectra], Suspicion | None], ...] = (
-        _not_repeating, partial(_answering_excitation, quantities=quantities), _noise_as_input,
-        partial(_exchanged, quantities=quantities), _contradicting_loop, _without_answer,
-    )  # fmt: skip
+        partial(_not_repeating, signal=signals.get("excitation")),
+        partial(_answering_excitation, quantities=quantities),
+        _noise_as_input,
+        partial(_exchanged, quantities=quantities),
+        _contradicting_loop,
+        _without_answer,
+    )
     with np.errstate(all="ignore"):  # a signal without power at a line gives NaN, which no rule rejects
         return found + [one for rule in rules if (one := rule(spectra)) is not None]
 
@@ -158,10 +162,17 @@ def _copies(signals: Mapping[Role, Floats], settings: Settings) -> Iterator[Susp
             yield Suspicion(message, Message("{remedy}; {keep}", remedy=remedy, keep=_ACCEPT), certain, both)
 
 
-def _not_repeating(spectra: RoleSpectra) -> Suspicion | None:
+def _not_repeating(spectra: RoleSpectra, signal: Floats | None) -> Suspicion | None:
     settings = spectra.settings
     if settings.method.reference != "excitation" or spectra.repeating >= _REPEATING_USUAL:
         return None
+    remedy = Message("name the channel of the signal that is added; {spectrum}", spectrum=ANY_EXCITATION)
+    period = None if signal is None else _period(signal, settings.lines.rate_hz)
+    if period is not None and settings.lines.window % period:
+        remedy = Message(
+            "it repeats every {period} samples: choose a multiple of them as window (lines.window, option --window)",
+            period=period,
+        )
     return Suspicion(
         Message(
             "{excitation} does not repeat like an excitation: {percent:.2g} % of its variance repeats every "
@@ -170,12 +181,20 @@ def _not_repeating(spectra: RoleSpectra) -> Suspicion | None:
             percent=100 * max(spectra.repeating, 0.0),
             window=settings.lines.window,
         ),
-        Message(
-            "name the channel of the signal that is added; {spectrum}; {keep}", spectrum=ANY_EXCITATION, keep=_ACCEPT
-        ),
+        Message("{remedy}; {keep}", remedy=remedy, keep=_ACCEPT),
         spectra.repeating < _REPEATING_MIN,
         (settings.excitation,),
     )
+
+
+def _period(signal: Floats, rate_hz: float) -> int | None:
+    """The period with which a signal repeats, in samples; None if it does not."""
+    from livebode.excitation import recognise  # its statistics are slow to import
+
+    try:
+        return recognise(signal, rate_hz, doubtful=True).period
+    except LivebodeError:
+        return None
 
 
 def _answering_excitation(spectra: RoleSpectra, quantities: ChannelQuantities) -> Suspicion | None:

@@ -13,6 +13,7 @@ Text = Annotated[str, Field(max_length=100_000)]
 Digest = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
 Count = Annotated[int, Field(ge=0, lt=1 << 62)]
 Positive = Annotated[int, Field(gt=0, lt=1 << 62)]
+Epoch = Annotated[int, Field(ge=0, lt=1 << 64)]  # the frames have 64 bits for it
 Section = dict[str, Any]
 
 
@@ -159,7 +160,7 @@ class _AnySummary(_Part):
     record: _Record | None = None
     left_out_samples: Count | None = None
     clock: list[Annotated[list[float], Field(min_length=2, max_length=2)]] | None = None
-    numbering: list[Annotated[list[Count], Field(min_length=3, max_length=3)]] = []
+    numbering: list[Annotated[tuple[Count, Epoch, Count], Field(strict=False)]] = []  # JSON has lists
     files: dict[str, list[Section]] = {}
 
 

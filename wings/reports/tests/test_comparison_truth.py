@@ -17,8 +17,10 @@ from livebode.interface import write_examples
 from livebode.records import RunRecord
 from livebode_reports.difference import ALPHA, Difference, compare
 from tests.support import command
+from tests.support.browser import chromium
 from tests.support.command import livebode
 from tests.support.reports import LINES, measured, plant, strokes, write_run
+from tools.two_mass_servo import Servo, write_servo
 
 _SETTINGS = Settings(lines=command.LINES, output="y", input="u", excitation="w", hop=20)
 
@@ -160,6 +162,28 @@ def test_a_size_without_a_unit_is_refused(tmp_path: Path, size: str) -> None:
 def _first_lines(of: Responses, n: int) -> Responses:
     rows = {name: getattr(of, name)[:, :n] for name in PER_LINE}
     return replace(of, lines=Lines(of.lines.bins[:n], of.lines.window, of.lines.rate_hz), **rows)
+
+
+def test_no_table_of_precise_parameters_is_wider_than_its_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Bounds of 1e-7 and a change of nothing: many digits in each column."""
+    monkeypatch.chdir(tmp_path)
+    write_servo(tmp_path / "servo.csv", Servo(noise=1e-5))
+    assert livebode("inspect", "servo.csv", "--out", "servo.toml", "--yes").code == 0
+    for run in ("before", "after"):
+        assert livebode("run", "servo.toml", "--out", run).code == 0
+    assert livebode("compare", "before", "after", "--out", "both").code == 0
+    with chromium() as browser:
+        page = browser.new_page(viewport={"width": 1440, "height": 900})
+        page.goto((tmp_path / "both.html").as_uri())
+        rows = page.locator("table:not(.answers)").first.locator("tbody tr").all_inner_texts()
+        wide = page.evaluate(
+            "[...document.querySelectorAll('div.wide')]"
+            ".map((e) => [e.scrollWidth - e.clientWidth, e.innerText.slice(0, 99)])"
+        )
+        page.close()
+    assert any("motor inertia" in row and "e-0" in row for row in rows), rows
+    assert not [text for more, text in wide if more > 0]
+    assert not any("-0.0" in row or "−0.0" in row or "0.00000000" in row for row in rows), rows
 
 
 def test_of_equal_runs_each_amount_is_zero_and_no_number_below_a_million_has_an_exponent(

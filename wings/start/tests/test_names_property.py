@@ -80,6 +80,9 @@ def test_no_request_answers_with_a_file_outside(places: tuple[Path, str], name: 
 
 
 @given(name=NAMES)
+@example("a" * 300 + ".json")
+@example(".json")
+@example("a" * 95 + ".json" + "b" * 50)
 def test_a_harmless_name_is_one_of_every_system(name: str) -> None:
     found = harmless_name(name)
     assert found == os.path.basename(found) == harmless_name(found)

@@ -125,6 +125,25 @@ def test_span_lines_and_window_are_used_as_edited(tmp_path: Path) -> None:
     assert newest(folder / "servo").time_s[0] < 7
 
 
+def test_a_span_that_is_dragged_is_legible_in_its_fields_and_used(tmp_path: Path) -> None:
+    folder = tmp_path / "runs"
+    with start_page(folder) as url, chromium() as browser, Tab(browser, url, wait=False) as tab:
+        drop(tab, write_servo(tmp_path / "servo.csv"))
+        tab.page.wait_for_selector(".u-over")
+        box = tab.page.locator(".u-over").first.bounding_box()
+        assert box
+        for share, act in ((0.2137, tab.page.mouse.down), (0.8719, tab.page.mouse.up)):
+            tab.page.mouse.move(box["x"] + share * box["width"], box["y"] + 9, steps=4)
+            act()
+        tab.page.click("#use")
+        span = [float(tab.page.input_value(f"#{field}")) for field in ("from", "to")]
+        cut = "(e) => e.scrollWidth > e.clientWidth || e.value.length > 6"
+        assert not any(tab.page.eval_on_selector(f"#{field}", cut) for field in ("from", "to"))
+        np.testing.assert_allclose(span, [0.2137 * 8, 0.8719 * 8], atol=0.03)
+        tab.page.wait_for_selector("#measure:enabled")
+        assert f"from = {span[0]}" in (tab.page.text_content("#text") or "")
+
+
 def test_a_german_csv_is_measured_on_a_phone(tmp_path: Path) -> None:
     folder = tmp_path / "runs"
     with start_page(folder) as url, chromium() as browser, Tab(browser, url, wait=False, **PHONE) as tab:

@@ -98,7 +98,10 @@ def test_a_run_of_which_no_baseline_is_learned_is_not_offered_for_one(tab: Tab, 
     assert page.is_disabled('input[value="averaged"]')
     assert not page.is_checked('input[value="averaged"]')
     assert page.is_checked('input[value="monday"]')
-    assert "without the average" in page.locator("label", has_text="averaged").inner_text()
+    assert "without the average" in page.inner_text("#runs")
+    label = page.locator("label", has_text="averaged")
+    assert label.inner_text().strip() == "averaged (averaged)"
+    assert label.bounding_box()["height"] < 40, "the name is on one line"
 
 
 def test_the_sentence_of_the_command_is_at_the_field_that_mends_it(tab: Tab, folder: Path) -> None:

@@ -16,17 +16,20 @@ let heard = "";
  */
 const verdictOf = ({ facts, health, verdicts }) => (facts && health ? health.verdict : verdicts[facts?.axis ?? 0]);
 
-/** @param {Page} page */
-export function firstLook(page) {
+/**
+ * @param {Page} page
+ * @param {boolean} current whether what the page knows is the state of the run: the server answers, or both have ended
+ */
+export function firstLook(page, current) {
   const verdict = verdictOf(page);
-  const { text, tone, detail } = sentence(page.up, verdict);
+  const { text, tone, detail } = sentence(current, verdict);
   const host = $("verdict");
   const shown = `${SIGNS[tone]} ${text}`;
   if (host.textContent !== shown) host.textContent = shown;
   host.className = `first-look ${tone}`;
   $("headline").className = `headline ${tone}`;
   host.title = detail;
-  const meaning = page.up ? `${verdict?.word} ${verdict?.cause}` : "";
+  const meaning = current ? `${verdict?.word} ${verdict?.cause}` : "";
   if (meaning === heard) return;
   heard = meaning;
   $("verdict-heard").textContent = text;

@@ -1,5 +1,6 @@
 // @ts-check
-// A lost server or a silent machine: since when, and the plots are greyed; both end by themselves.
+// A lost server or a silent machine: since when, and the plots are greyed; both end by themselves. The server of a run
+// that has ended is not lost.
 import { clockTime, onClock } from "./clock.js";
 import { tr } from "./language.js";
 
@@ -11,8 +12,11 @@ export class Lost {
     this.host = host;
     /** @type {Date | null} */
     this.since = null;
+    /** @type {"" | "over" | "server" | "machine"} */
     this.what = "";
     this.connected = false;
+    /** Whether the run was at its end when its server was last heard. */
+    this.over = false;
     onClock(() => this.draw());
   }
 
@@ -22,8 +26,9 @@ export class Lost {
    */
   show({ up, facts, health }, following) {
     this.connected ||= up;
+    if (up && health) this.over = Boolean(health.ending);
     const silent = following && facts?.begun && health?.stale;
-    const what = !up && this.connected ? "server" : up && silent ? "machine" : "";
+    const what = !up && this.connected ? (this.over ? "over" : "server") : up && silent ? "machine" : "";
     if (what !== this.what) {
       const silentS = what === "machine" ? (health?.silent_s ?? 0) : 0;
       this.since = what ? new Date(Date.now() - 1000 * silentS) : null;
@@ -33,13 +38,16 @@ export class Lost {
   }
 
   draw() {
-    document.body.classList.toggle("stale", this.since !== null);
+    document.body.classList.toggle("stale", this.since !== null && this.what !== "over");
     this.host.hidden = this.since === null;
+    this.host.classList.toggle("over", this.what === "over");
     if (!this.since) return;
     const time = clockTime(this.since);
-    this.host.textContent =
-      this.what === "server"
-        ? tr("No connection to the server since {time}; the plots show that moment.", { time })
-        : tr("No samples from the machine since {time}; the plots show that moment.", { time });
+    const words = {
+      over: tr("The run and its server ended at {time}; `livebode view` shows the run again.", { time }),
+      server: tr("No connection to the server since {time}; the plots show that moment.", { time }),
+      machine: tr("No samples from the machine since {time}; the plots show that moment.", { time }),
+    };
+    this.host.textContent = this.what && words[this.what];
   }
 }

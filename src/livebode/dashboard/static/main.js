@@ -408,14 +408,14 @@ function status() {
   const { up, facts, health } = page;
   if (!facts) return;
   const known = { up, facts, health };
+  lost.show(known, timeline.span.live && timeline.atS === null);
   document.body.classList.toggle("not-begun", !facts.begun);
-  const [word, look] = lamp(known, timeline.span, timeline.atS !== null && timeline.following);
+  const [word, look] = lamp({ ...known, over: lost.over }, timeline.span, timeline.atS !== null && timeline.following);
   $("lamp").className = `lamp ${look}`;
   // The long name of an entry is in the choice beside it: twice there, the header would need a second row.
   $("status-text").textContent = facts.begun && facts.matrix ? word : `${facts.name} · ${word}`;
   $("status").title = facts.name;
-  lost.show(known, timeline.span.live && timeline.atS === null);
-  firstLook(page);
+  firstLook(page, up || lost.over);
   wall.draw();
 }
 

@@ -137,9 +137,9 @@ export class TrendChart {
     const run = this.at < 0 ? "" : this.quantity.points[this.at]?.run;
     Object.assign(this, { quantity, marks, range, details });
     this.at = quantity.points.findIndex((point) => point.run === run);
-    const { points, unit, model, name } = quantity;
+    const { points, unit, model, name, shared } = quantity;
     const last = points.at(-1);
-    const text = name === ALARMS ? tr("Alarms in each run") : words(name);
+    const text = name === ALARMS ? tr("Alarms in each run") : shared ? `${words(name)}, ${model}` : words(name);
     const now = last ? (name === ALARMS ? String(last.value) : bounded(last.value, last.bound, unit)) : "–";
     this.title.replaceChildren(text, element("span", {}, tr("last: {value}", { value: now })));
     this.card.dataset.name = model ? `${model}/${name}` : name;

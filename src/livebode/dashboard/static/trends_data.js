@@ -8,7 +8,7 @@
 /** @typedef {[model: string, name: string, at: number[], timeS: number[], value: number[], bound: number[]]} SentDetail */
 /** @typedef {{points: SentPoint[], alarms: SentAlarm[], baseline: string | null}} RunTrend */
 /** @typedef {{run: string, at: number, timeS: number, value: number, bound: number, low: number, high: number, written: boolean, message?: import("./messages.js").Words}} Point */
-/** @typedef {{model: string, name: string, unit: string, points: Point[]}} Quantity */
+/** @typedef {{model: string, name: string, unit: string, points: Point[], shared?: boolean}} Quantity `shared`: by several models */
 /** @typedef {{at: number, baseline: string, machine: string}} BaselineMark */
 
 export const ALARMS = "alarms";
@@ -65,7 +65,9 @@ export function quantitiesOf(runs, trends, byWritten) {
     });
   }
   for (const { points } of [...found.values(), counts]) points.sort((a, b) => a.at - b.at);
-  const quantities = [...found.values()].sort((a, b) => rank(a) - rank(b));
+  const quantities = [...found.values()].sort((a, b) => rank(a) - rank(b) || a.name.localeCompare(b.name));
+  for (const quantity of quantities)
+    quantity.shared = quantities.some(({ name, model }) => name === quantity.name && model !== quantity.model);
   if (counts.points.length) quantities.unshift(counts);
   return { quantities, apart };
 }

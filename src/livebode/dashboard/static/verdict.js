@@ -15,13 +15,13 @@ const seconds = (s) => (s < 120 ? `${Math.round(s)} s` : `${Math.round(s / 60)} 
 /**
  * Word and look of the lamp; green only if the display is current.
  *
- * @param {Known} known
+ * @param {Known & {over: boolean}} known `over`: its server ended with the run
  * @param {{live: boolean, growing: boolean}} span
  * @param {boolean} paused
  * @returns {[word: string, look: string]}
  */
-export function lamp({ up, facts, health }, { live, growing }, paused) {
-  if (!up) return [tr("no connection"), "lost"];
+export function lamp({ up, over, facts, health }, { live, growing }, paused) {
+  if (!up) return over ? [tr("recorded"), ""] : [tr("no connection"), "lost"];
   if (!facts.begun) return [tr("waiting for the first samples"), "stale"];
   if (paused) return [tr("paused"), "paused"];
   if (!live) return growing ? [tr("being recorded"), ""] : [tr("recorded"), ""];

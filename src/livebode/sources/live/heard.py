@@ -30,7 +30,7 @@ _TICK_S = 0.05
 _NICE = (1.0, 1.25, 2.0, 2.5, 4.0, 5.0, 8.0)
 _NEAR = 0.03  # of a rate: arrivals within three seconds do not give it better
 _BYTES_SHOWN = 24
-_NEITHER = "what arrives is neither samples for livebode nor JSON"
+_NEITHER = "what arrives is neither JSON nor samples for livebode"
 
 
 @dataclass(frozen=True)

@@ -326,7 +326,7 @@ class Comparison:
                 parts += [Paragraph(worded(words))] if words else []
                 headings = (
                     "", tr("before"), "±", tr("after"), "±", tr("unit"), tr("change"), "±", tr("in %"),
-                    tr("detectable %"), tr("significant"),
+                    tr("detectable %"), tr("differs"),
                 )  # fmt: skip
                 note = tr(
                     "± of before and after covers 95 % each; ± of the change covers the whole table together "

@@ -72,9 +72,12 @@ th { text-align: left; font-weight: 600; border-bottom: 1.5px solid var(--c5b677
 th, td { padding: .28rem .7rem .28rem 0; vertical-align: top; }
 td { border-bottom: 1px solid var(--ce3e7ec); overflow-wrap: anywhere; }
 thead td { border-bottom: 1.5px solid var(--c5b6775); }
-td:first-child { min-width: 6rem; }
+td:first-child { min-width: 6.8rem; }
 table.pairs td:first-child { width: 14rem; color: var(--c5b6775); }
-.number { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; padding-left: .5rem; }
+.number { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap;
+  padding: .28rem .5rem .28rem .2rem; }
+thead .number { white-space: normal; }
+.number + td:not(.number) { overflow-wrap: normal; }
 pre { padding: .9rem 1rem; background: var(--shade); border-radius: 4px; white-space: pre-wrap; overflow-wrap: anywhere;
   font: .84rem/1.45 ui-monospace, "DejaVu Sans Mono", monospace; }
 footer { margin-top: 3rem; color: var(--c5b6775); font-size: .85rem; overflow-wrap: anywhere; }

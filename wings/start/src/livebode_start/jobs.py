@@ -98,8 +98,8 @@ class Job:
 
     @property
     def sentence(self) -> str:
-        """The last sentence of the command, or its error, without the lines around it."""
-        return last_sentence(list(self.lines), failed=self.code not in (None, 0))
+        """The result of the command in a sentence, or its error, without the lines around it."""
+        return main_sentence(list(self.lines), failed=self.code not in (None, 0))
 
     def plain(self) -> dict[str, Any]:
         """For the page."""
@@ -113,7 +113,7 @@ class Job:
             "progress": self.progress,
             "code": self.code,
             "arguments": list(self.order.arguments),
-            "sentence": last_sentence(lines, failed=self.code not in (None, 0)),
+            "sentence": main_sentence(lines, failed=self.code not in (None, 0)),
             "output": "\n".join(lines),
         }
 
@@ -235,15 +235,17 @@ class Jobs:
             job.process.kill()
 
 
-def last_sentence(lines: list[str], *, failed: bool) -> str:
+def main_sentence(lines: list[str], *, failed: bool) -> str:
     """The sentence of a command that a person should read, from the lines that it printed.
 
-    >>> last_sentence(["reading", "livebode: no such file 'a.csv'; check its name"], failed=True)
+    >>> main_sentence(["reading", "livebode: no such file 'a.csv'; check its name"], failed=True)
     "no such file 'a.csv'; check its name"
-    >>> last_sentence(["╭─ Error ────╮", "│ No such    │", "│ option     │", "╰────────────╯"], failed=True)
+    >>> main_sentence(["╭─ Error ────╮", "│ No such    │", "│ option     │", "╰────────────╯"], failed=True)
     'No such option'
-    >>> last_sentence(["baselines/x.json", "", "Next: livebode learn --history baselines/x.json"], failed=False)
-    'baselines/x.json'
+    >>> main_sentence(["Learned from 380 windows.", "baselines/x.json", "", "Next: livebode run …"], failed=False)
+    'Learned from 380 windows.'
+    >>> main_sentence(["report.html", "report.pdf", "Next: livebode view …"], failed=False)
+    'report.pdf'
     """
     filled = [line for line in lines if line.strip() and not line.startswith("Next: ")]  # that is for a terminal
     if failed:
@@ -252,7 +254,8 @@ def last_sentence(lines: list[str], *, failed: bool) -> str:
             return "\n".join(filled[starts[-1] :]).removeprefix("livebode: ")
         if framed := [found[1] for line in filled if (found := _FRAMED.fullmatch(line.strip()))]:
             return " ".join(framed)
-    return filled[-1].strip() if filled else ""
+    lines = [line.strip() for line in filled if not line.startswith("Next: ")]
+    return next((line for line in lines if line.endswith(".")), lines[-1] if lines else "")
 
 
 def file_name(text: object) -> str:

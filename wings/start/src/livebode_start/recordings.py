@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
@@ -251,15 +251,16 @@ def _found(opened: OpenedRecording, choices: Choices) -> ProposedConfiguration:
     estimator, reason = suitable_estimator(log, signals)
     estimator = choices.estimator or estimator
     average = "schedule" not in signals and not choices.baseline if choices.average is None else choices.average
-    model = choices.model or suitable_model(log, signals, estimator)
+    model = choices.model or suitable_model(opened.proposals, signals, estimator)
     source = {**opened.source, "from": choices.begin_s, "to": choices.end_s}
     tables = tables_of(source, signals, estimator=estimator, average=average, model=model)
-    if choices.baseline:
-        tables["monitoring"] = {"baseline": f"baselines/{choices.baseline}.json"}
     if choices.lines is not None:
         tables["lines"] = choices.lines.model_dump()
     reasons = {role: _reason(opened, role, name) for role, name in signals.items()}
     result = settled(log, tables, reasons)
+    if choices.baseline:  # in the directory of the runs, which is not that of this process
+        monitoring = {"baseline": f"baselines/{choices.baseline}.json"}
+        result = replace(result, tables={**result.tables, "monitoring": monitoring})
     if opened.heard is not None and "lines" not in result.tables:
         raise UsageError(
             "missing",

@@ -96,8 +96,7 @@ def remove_abandoned(directory: Path) -> None:
             lock = Lock(partial)
             try:
                 name = json.loads(read_bytes(partial, _MARK, _MARK_BYTES_MAX))["recording"]
-                if name == harmless_name(name):
-                    remove_files(partial, [name, _MARK])
+                remove_files(partial, [name, _MARK])  # which refuses a name with a path
             finally:
                 lock.release()
             remove_empty(partial)

@@ -40,12 +40,15 @@ def harmless_name(text: str) -> str:
     text = _FORBIDDEN.sub("_", text).strip(". ")
     if _DEVICE.fullmatch(text):
         text = f"_{text}"
+    if text.lower().endswith(_OWN):
+        text += ".txt"
     stem, dot, ending = text.rpartition(".")
     if not dot or len(ending) > _ENDING_LETTERS_MAX:
         stem, ending = text, ""
     stem = stem.encode()[:NAME_BYTES_MAX].decode(errors="ignore").strip(". ") or "recording"
-    name = f"{stem}.{ending}" if ending else stem
-    return f"{name}.txt" if name.lower().endswith(_OWN) else name
+    if not ending and stem.lower().endswith(_OWN):  # where it was cut
+        ending = "txt"
+    return f"{stem}.{ending}" if ending else stem
 
 
 class Workspace:

@@ -173,7 +173,7 @@ def tune(
         raise TuneError(
             "loop-unchecked",
             "it was not checked that the described controllers are those of the machine",
-            "compare them with the recording: livebode validate --loop",
+            "compare them with the recording by livebode validate --loop RUN, or confirm it",
             argument="loop_checked",
         )
     asked = specification or LoopSpecification()

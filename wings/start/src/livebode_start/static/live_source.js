@@ -47,7 +47,7 @@ export function addressForm(measuring) {
       "small",
       { id: "address-hint" },
       tr(
-        "udp://, tcp://, mqtt://, opc.tcp:// or ads:// with host and port. No password here: for a source with one, set password_env or password_file in an axis.toml.",
+        "udp://, tcp://, mqtt:// or opc.tcp:// with host and port. No password here: for a source with one, set password_env or password_file in an axis.toml.",
       ),
     ),
     status,

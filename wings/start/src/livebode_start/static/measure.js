@@ -189,7 +189,11 @@ function show(facts) {
     $("use").hidden = signals.whole || facts.heard !== undefined;
   };
   $("use").addEventListener("click", () => {
-    [from.value, to.value] = signals.span.map((s) => String(Math.round(s * facts.rate_hz) / facts.rate_hz));
+    // A thousandth of what is shown is less than a pixel.
+    const digits = Math.max(0, 3 - Math.floor(Math.log10(signals.span[1] - signals.span[0])));
+    [from.value, to.value] = signals.span.map((s) =>
+      String(Math.min(Math.max(Number(s.toFixed(digits)), facts.begin_s), facts.end_s)),
+    );
     used();
     settle();
   });

@@ -188,20 +188,14 @@ export function showRuns(host, task, most, runs, chosen, onChange) {
       box.checked = chosen.includes(run.name) && !run.averaged;
       return box;
     });
-    const lines = boxes.map((box, number) =>
-      element(
-        "label",
-        { class: "box" },
-        box,
-        box.value,
-        ...(whole[number].averaged
-          ? [element("small", {}, tr("averaged over all periods: measure its recording again without the average"))]
-          : []),
-      ),
+    const lines = boxes.map((box) =>
+      element("label", { class: "box" }, box, box.disabled ? tr("{run} (averaged)", { run: box.value }) : box.value),
     );
-    host.append(
-      element("fieldset", { class: "group boxes" }, element("legend", {}, tr("Runs of the healthy machine")), ...lines),
-    );
+    const hint = boxes.some((box) => box.disabled)
+      ? [element("small", {}, tr("No baseline is learned from averaged runs: measure again without the average."))]
+      : [];
+    const title = element("legend", {}, tr("Runs of the healthy machine"));
+    host.append(element("fieldset", { class: "group boxes" }, title, ...lines, ...hint));
     return () => boxes.filter((box) => box.checked).map((box) => box.value);
   }
   const texts = { compare: [tr("Before"), tr("After")], design: [tr("Machine as measured by a run")] }[task] ?? [
