@@ -60,8 +60,8 @@ def hide() -> None:
 
     sys.modules["msvcrt"] = types.ModuleType("msvcrt")
     vars(sys.modules["msvcrt"]).update(locking=locking, LK_NBLCK=2)
-    for module in MODULES:
-        sys.modules[module] = None  # type: ignore[assignment]
+    for name in MODULES:
+        sys.modules[name] = None  # type: ignore[assignment]
     for module, names in ((os, OF_OS), (signal, OF_SIGNAL), (time, OF_TIME)):
         for name in names:
             if hasattr(module, name):
@@ -74,7 +74,7 @@ def hide() -> None:
             raise PermissionError(errno.EACCES, "Permission denied", path)
         return opened(path, flags, mode, dir_fd=dir_fd)
 
-    os.open = open_file
+    os.open = open_file  # type: ignore[assignment]
     _hide_polling()
 
 

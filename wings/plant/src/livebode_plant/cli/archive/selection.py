@@ -93,10 +93,10 @@ class SelectionOptions:
         )
 
 
-def with_selection(*names: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
+def with_selection(*names: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """A command with these options in place of its parameter `chosen`, which receives them as SelectionOptions."""
 
-    def decorated(command: Callable[..., None]) -> Callable[..., None]:
+    def decorated(command: Callable[..., Any]) -> Callable[..., Any]:
         @wraps(command)
         def selecting(**given: Any) -> None:
             command(chosen=SelectionOptions(**{name: given.pop(name) for name in names}), **given)
