@@ -104,14 +104,19 @@ def test_the_advice_of_a_refusal_works(case: str, tmp_path: Path) -> None:
 ROLES = "--excitation w --input u --output y"
 ADVICE = [
     # (refused, what its remedy says, what follows it, one after the other)
-    ("run log.csv", "livebode inspect lists the channels", "inspect log.csv"),
     (
-        "run log.csv",
-        "with --out axis.toml it proposes their roles",
-        "inspect log.csv --yes --out roles.toml",
+        "run twins.csv",
+        "lists the channels and proposes their roles",
+        "inspect twins.csv",
+        "inspect twins.csv --yes --out roles.toml",
         "run roles.toml --out r",
     ),
-    ("run log.csv", "give --output CHANNEL", "run log.csv --output y --input u --estimator direct --out r"),
+    ("run twins.csv", "give --output CHANNEL", "run twins.csv --output y --out r"),
+    (
+        "inspect quiet.csv --yes --out n.toml",
+        "give --output CHANNEL",
+        "inspect quiet.csv --yes --input b --output c --out n.toml",
+    ),
     ("inspect log.csv --out n.toml", "take the proposals with --yes", "inspect log.csv --yes --out n.toml"),
     (
         "inspect other.csv --out n.toml",
@@ -119,9 +124,9 @@ ADVICE = [
         "inspect other.csv --yes --excitation a --input b --output c --out n.toml",
     ),
     (
-        "inspect other.csv --yes --output c --out n.toml",
-        "give --input CHANNEL",
-        "inspect other.csv --yes --output c --input b --out n.toml",
+        "inspect quiet.csv --yes --output c --out n.toml",
+        "give --excitation and --input",
+        "inspect quiet.csv --yes --output c --excitation a --input b --estimator lpm --out n.toml",
     ),
     ("inspect log.csv --yes --out one.toml", "replace it with --force", "inspect log.csv --yes --out one.toml --force"),
     (
@@ -196,11 +201,6 @@ ADVICE = [
 OF_SENTENCES = [
     (f"run spike.csv {ROLES} --out r", "--all-periods includes them", f"run spike.csv {ROLES} --all-periods --out r"),
     (f"run log.csv {ROLES} --out r", "`livebode learn` creates one from healthy runs", "learn r --out new.json"),
-    (
-        "compare one one",
-        "`livebode inspect --out axis.toml --fit auto` writes one",
-        "inspect log.csv --yes --fit auto --out n.toml",
-    ),
 ]
 
 
@@ -211,6 +211,9 @@ def prepared(tmp_path_factory: pytest.TempPathFactory) -> Path:
     given, rng = signals(), np.random.default_rng(4)
     write_csv(folder / "log.csv", given)
     write_csv(folder / "other.csv", dict(zip("tabc", given.values())))
+    twins = {"y": given["y"], "y2": 2 * given["y"] + 0.01 * rng.standard_normal(2000)}
+    write_csv(folder / "twins.csv", {"t": given["t"], "a": given["w"], "b": given["u"]} | twins)
+    write_csv(folder / "quiet.csv", {"t": given["t"]} | {name: rng.standard_normal(2000) for name in "abc"})
     write_csv(folder / "nan.csv", given | {"y": np.where(np.arange(2000) % 60, given["y"], np.nan)})
     write_csv(folder / "spike.csv", given | {"y": given["y"] + 5 * (np.arange(2000) // 7 == 143)})
     w = rng.standard_normal(2000)
@@ -366,11 +369,14 @@ NOT_HERE = {
     "`livebode run`": "a record that names no channels, which no command writes",
     "`livebode run --force`": "a damaged run: tests/records/test_file_damage_fault.py",
     "export, by SQL": "an output-only run: wings/modes/tests/test_command_truth.py",
+    "give --input CHANNEL": "only where the samples name an excitation and no input: tests/preparation",
     "--help": "every command has it: tests/meta/test_command_line.py",
-    "configuration by livebode inspect": "a live source: tests/sources/test_foreign_messages_truth.py",
-    "directory that this writes: livebode run": "in tests/cli/test_next_step_truth.py",
-    "see its results: livebode view": "serves until it is ended; wings and the dashboard's tests start it",
-    "by {}": "the command line is composed; `run --output-only` is executed above",
+    "describe the axis by [belt] in place of [measured]": "in wings/design/tests/test_simulated_measurement_truth.py",
+    "livebode inspect ": "an address at which nothing usable comes",
+    "install the wing": "an installation without a wing",
+    "--hop {usual} gives the usual number": "a long recording: tests/preparation/test_long_recordings_truth.py",
+    "choose a multiple of them as window": "in tests/preparation/test_roles_truth.py",
+    "run a part of the recording (--from, --to)": "a drift: tests/runtime/test_average_truth.py",
 }
 """Advice of errors that is not executed here, and why."""
 

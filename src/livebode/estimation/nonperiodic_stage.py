@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -170,7 +170,6 @@ class NonPeriodicStage(StatefulBase):
     def responses(self, rows: Sequence[Row], channels: Sequence[Channel]) -> Responses:
         """The rows as Responses of these channels."""
         moments = np.array([row.moment for row in rows]).reshape(-1, 3)
-        at_lines = [row.lines for row in rows]
         return Responses(
             lines=self._settings.lines,
             dof=np.array([row.dof for row in rows], dtype=np.float64),
@@ -180,11 +179,15 @@ class NonPeriodicStage(StatefulBase):
             schedule=moments[:, 1],
             quantity=self._settings.quantity,
             unit=response_unit(channels, self._settings),
-            **{
-                name: np.array([row[name] for row in at_lines], dtype=nothing.dtype).reshape(-1, nothing.size)
-                for name, nothing in self._nothing().items()
-            },
+            **self._columns([row.lines for row in rows]),
         )
+
+    def _columns(self, rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+        """What a row has at each line, as arrays of shape (rows, lines)."""
+        return {
+            name: np.array([row[name] for row in rows], dtype=nothing.dtype).reshape(-1, nothing.size)
+            for name, nothing in self._nothing().items()
+        }
 
 
 def separable(quotient: Quotient) -> NDArray[np.bool_]:

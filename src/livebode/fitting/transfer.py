@@ -77,7 +77,8 @@ class Transfer(NamedTuple):
             poles[poles == 0] = _TINY**0.1  # a pole that friction hardly moves: equivalent to an integrator
             weights = (self._residues(poles) / poles)[..., np.newaxis, :]
             poles = poles[..., np.newaxis] * tick
-            end: Any = np.expm1(poles)
+            with np.errstate(over="ignore"):  # of a trial far from stable, which its search leaves again
+                end: Any = np.expm1(poles)
             sampled = 1 / ((z - 1)[..., np.newaxis, :] - end)
             if late is None:
                 weights = weights * end[..., np.newaxis, :, 0]

@@ -70,7 +70,7 @@ def unit_by_name(name: str) -> str:
 
 
 @dataclass(frozen=True)
-class Quantities:
+class ChannelQuantities:
     """What the configuration declares of some channels, by name, before their names and units in the source.
 
     Parameters
@@ -87,9 +87,9 @@ class Quantities:
 
     Examples
     --------
-    >>> Quantities(units={"load": "0.024 N m"}).channel("load", "%")
+    >>> ChannelQuantities(units={"load": "0.024 N m"}).channel("load", "%")
     Channel(name='load', unit='N m', kind='torque')
-    >>> Quantities().channel("Istdrehzahl", "1/min").factor, Quantities().channel("Actual torque", "%")
+    >>> ChannelQuantities().channel("Istdrehzahl", "1/min").factor, ChannelQuantities().channel("Actual torque", "%")
     (0.10471975511965977, Channel(name='Actual torque', unit='%', kind='torque'))
     """
 
@@ -113,10 +113,10 @@ class Quantities:
         """The channels of which something is declared, each once."""
         return list(dict.fromkeys([*self.kinds, *self.units]))
 
-    def renamed(self, names: Mapping[str, str]) -> Quantities:
+    def renamed(self, names: Mapping[str, str]) -> ChannelQuantities:
         """The same of channels with other names."""
         kinds = {names.get(name, name): kind for name, kind in self.kinds.items()}
-        return Quantities(kinds, {names.get(name, name): unit for name, unit in self.units.items()})
+        return ChannelQuantities(kinds, {names.get(name, name): unit for name, unit in self.units.items()})
 
     def channel(self, name: str, unit: str, of: str | None = None) -> Channel:
         """The channel `name` whose unit in the source is `unit`: with its SI unit, if that is recognised.

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from livebode.core import ServerError
 from livebode.records import RunRecord
-from livebode_start.jobs import RUNNING_MAX, Job, JobOrder, Jobs, file_name
+from livebode_start.jobs import RUNNING_MAX, CommandJob, JobOrder, Jobs, file_name
 from tests.support.browser import until
 from tests.support.command import livebode, signals, write_csv
 
@@ -39,7 +39,7 @@ def jobs(tmp_path: Path) -> Iterator[Jobs]:
     started.close()
 
 
-def ended(job: Job) -> Job:
+def ended(job: CommandJob) -> CommandJob:
     assert job.ended.wait(60), job.plain()
     return job
 

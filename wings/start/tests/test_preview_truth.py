@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from livebode.sources import open_log
 from livebode_start import preview
-from livebode_start.preview import Overview
+from livebode_start.preview import SignalOverview
 
 
 @settings(max_examples=40, deadline=None)
@@ -30,7 +30,7 @@ def test_extremes_are_those_of_all_samples(
     points = data.draw(st.integers(1, 300))
     before, preview.OVERVIEW_PIECES = preview.OVERVIEW_PIECES, pieces
     try:
-        shown = Overview.read(open_log(path), ["y"], samples).plain("y", begin / 1000, end / 1000, points)
+        shown = SignalOverview.read(open_log(path), ["y"], samples).plain("y", begin / 1000, end / 1000, points)
     finally:
         preview.OVERVIEW_PIECES = before
     first, size = round(shown["from_s"] * 1000), round(shown["step_s"] * 1000)

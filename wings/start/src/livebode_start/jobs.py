@@ -57,7 +57,7 @@ class JobOrder:
 
 
 @dataclass(eq=False)
-class Job:
+class CommandJob:
     """A command that runs, or has ended.
 
     Attributes
@@ -154,11 +154,11 @@ class Jobs:
 
     def __init__(self, directory: Path) -> None:
         self.directory = directory
-        self._jobs: OrderedDict[str, Job] = OrderedDict()
+        self._jobs: OrderedDict[str, CommandJob] = OrderedDict()
         self._lock = threading.Lock()
         self._closed = False
 
-    def start(self, order: JobOrder) -> Job:
+    def start(self, order: JobOrder) -> CommandJob:
         """Start a command.
 
         Raises
@@ -176,7 +176,7 @@ class Jobs:
                     limit=RUNNING_MAX,
                 )
             order.prepare()
-            job = Job(secrets.token_hex(8), order, _started(order.arguments, self.directory))
+            job = CommandJob(secrets.token_hex(8), order, _started(order.arguments, self.directory))
             self._jobs[job.id] = job
             for old in [name for name, other in self._jobs.items() if other.code is not None]:
                 if len(self._jobs) <= RETAINED_MAX:
@@ -185,7 +185,7 @@ class Jobs:
         threading.Thread(target=job.follow, name=f"livebode job {job.id}", daemon=True).start()
         return job
 
-    def job(self, name: object) -> Job:
+    def job(self, name: object) -> CommandJob:
         """The job of this name; ServerError if there is none, as after a restart of the server."""
         job = self._jobs.get(name) if isinstance(name, str) else None
         if job is None:
@@ -211,7 +211,7 @@ class Jobs:
         waiting.daemon = True
         waiting.start()
 
-    def listed(self) -> list[Job]:
+    def listed(self) -> list[CommandJob]:
         """All that are remembered, the newest first."""
         with self._lock:
             return list(reversed(self._jobs.values()))
@@ -230,7 +230,7 @@ class Jobs:
                 job.ended.wait(CLOSE_S)
 
     @staticmethod
-    def _kill(job: Job) -> None:
+    def _kill(job: CommandJob) -> None:
         if job.code is None:
             job.process.kill()
 

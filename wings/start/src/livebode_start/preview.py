@@ -18,7 +18,7 @@ _Extremes = tuple[Floats, Floats]
 
 
 @dataclass(frozen=True, eq=False)
-class Overview:
+class SignalOverview:
     """Extremes of whole channels, from which those of most spans follow without another reading.
 
     Attributes
@@ -40,7 +40,7 @@ class Overview:
     high: Floats
 
     @classmethod
-    def read(cls, log: Log, names: Sequence[str], stop: int) -> Overview:
+    def read(cls, log: Log, names: Sequence[str], stop: int) -> SignalOverview:
         """Read the channels once."""
         return cls(log, stop, tuple(names), *extremes(log, names, log.first, stop, OVERVIEW_PIECES))
 

@@ -27,7 +27,7 @@ from livebode.preparation import (
 from livebode.sources import Log, open_log
 from livebode.sources.live import Survey
 from livebode_start.listening import log_of_heard, shown
-from livebode_start.preview import Overview
+from livebode_start.preview import SignalOverview
 
 OPEN_MAX = 4
 """Recordings in memory."""
@@ -37,7 +37,7 @@ _ESTIMATORS = "joint", "direct", "lpm", "welch"
 Role = Literal["excitation", "input", "output", "schedule"]
 
 
-class LineChoice(BaseModel):
+class ChosenLines(BaseModel):
     """Lines and window as [lines] has them."""
 
     model_config = ConfigDict(extra="forbid")
@@ -73,7 +73,7 @@ class Choices(BaseModel):
     signals: dict[Role, str] = {}
     begin_s: float | None = None
     end_s: float | None = None
-    lines: LineChoice | None = None
+    lines: ChosenLines | None = None
     estimator: str | None = Field(None, max_length=20)
     average: bool | None = None
     model: str | None = Field(None, max_length=60)
@@ -127,9 +127,9 @@ class OpenedRecording:
         return max((block.stop for block in self.log.blocks([self.proposals.channels[0].name])), default=0)
 
     @cached_property
-    def overview(self) -> Overview:
+    def overview(self) -> SignalOverview:
         """Extremes of all channels."""
-        return Overview.read(self.log, [channel.name for channel in self.proposals.channels], self.stop)
+        return SignalOverview.read(self.log, [channel.name for channel in self.proposals.channels], self.stop)
 
     def plain(self) -> dict[str, Any]:
         """Facts, channels and proposed roles, for JSON."""

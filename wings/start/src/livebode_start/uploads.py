@@ -142,7 +142,7 @@ def _check_room(directory: Path, size_bytes: int) -> None:
                 free=free / 1e9,
                 size=(size_bytes + RESERVE_BYTES) / 1e9,
             ),
-            Message("free some space, or start livebode in a directory on another disk"),
+            Message("free some space, or choose a directory on another disk"),
             bytes=size_bytes,
             free_bytes=free,
         )

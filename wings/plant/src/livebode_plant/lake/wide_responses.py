@@ -113,7 +113,7 @@ def from_wide(table: pa.Table, found: Mapping[str, Any]) -> Responses:
     lines = lines_in(found)
     schema = wide_schema(len(lines))
     column = {field.name: as_numpy(table, field, lines) for field in schema}
-    values: dict[str, NDArray[Any]] = {name: column[name] for name in (*_COUNTED, "ready", "valid")}
+    values: dict[str, Any] = {name: column[name] for name in (*_COUNTED, "ready", "valid")}
     for name in ("time_s", *_ROUNDED, *_REAL):
         values[name] = column[name].astype(np.float64, copy=False)
     for name, (real, imaginary) in _COMPLEX.items():

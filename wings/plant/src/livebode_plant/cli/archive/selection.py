@@ -98,8 +98,8 @@ def with_selection(*names: str) -> Callable[[Callable[..., Any]], Callable[..., 
 
     def decorated(command: Callable[..., Any]) -> Callable[..., Any]:
         @wraps(command)
-        def selecting(**given: Any) -> None:
-            command(chosen=SelectionOptions(**{name: given.pop(name) for name in names}), **given)
+        def selecting(**given: Any) -> Any:
+            return command(chosen=SelectionOptions(**{name: given.pop(name) for name in names}), **given)
 
         kind = inspect.Parameter.KEYWORD_ONLY
         parameters: list[inspect.Parameter] = []
