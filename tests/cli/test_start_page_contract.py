@@ -47,6 +47,7 @@ def test_the_browser_opens_where_there_is_a_screen(tmp_path: Path) -> None:
     screen = {"DISPLAY": ":0", "BROWSER": "echo opened %s"}
     assert re.search(r"opened http://127\.0\.0\.1:\d+/", at_terminal(tmp_path, **screen))
     assert "opened" not in at_terminal(tmp_path, "view", "--no-browser", "--port", "0", **screen)
+    assert "opened" not in at_terminal(tmp_path, "--no-browser", **screen)
 
 
 def test_a_script_gets_the_help() -> None:

@@ -30,9 +30,9 @@ def main() -> None:
         return
     if words in (["--help"], ["-h"]) and _printed(_help()):
         return
-    if not words and _COMPLETION not in os.environ:
-        if _has_start_page():
-            sys.argv.append("view")
+    if words in ([], ["--no-browser"]) and _COMPLETION not in os.environ:
+        if words or _has_start_page():
+            sys.argv.insert(1, "view")
         elif _printed(_help()):
             sys.exit(_USAGE_ERROR)
     gc.set_threshold(OBJECTS_NEW)
