@@ -51,8 +51,11 @@ class Person:
         return self._computer_s + self.reading_s + self._other_s
 
     def open(self) -> None:
-        """The start page, or the list of runs."""
+        """The start page, which is read once, or the list of runs."""
         self.page.goto(self._dashboard.url)
+        if not self.clicks:
+            self.page.wait_for_selector("input[type=file]", state="attached")
+            self.words("body")
 
     def click(self, selector: str, read: str = "", extra_s: float = 0.0) -> None:
         """Read a part of the page, if it is new, and click."""
@@ -92,6 +95,8 @@ def measured(person: Person, recording: str, setup: Callable[[Person], object] |
     person.page.wait_for_selector("#measure:enabled")
     if setup is not None:
         setup(person)
+    for part in (".found", "#ready"):
+        person.words(part)
     person.click("#measure", read="#slots")
     person.page.wait_for_url("**/run/**")
     person.page.wait_for_function("() => window.livebode?.bode.curves.measured")
