@@ -111,7 +111,11 @@ ADVICE = [
         "inspect twins.csv --yes --out roles.toml",
         "run roles.toml --out r",
     ),
-    ("run twins.csv", "give --output CHANNEL", "run twins.csv --output y --out r"),
+    (
+        "run twins.csv",
+        "name them by --excitation, --input and --output",
+        "run twins.csv --excitation a --input b --output y --out r",
+    ),
     (
         "inspect quiet.csv --yes --out n.toml",
         "give --output CHANNEL",

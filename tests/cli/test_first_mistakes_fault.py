@@ -56,9 +56,12 @@ MISTAKES = [
     ("run log.csv --input u", "the output channel is not named"),
     (
         "run axes.csv",
-        "the output could be 'speed1' or 'speed2'; give --output CHANNEL; `livebode inspect axes.csv --out",
+        "the output could be 'speed1' or 'speed2'; name them by --excitation, --input and --output; `livebode inspect axes",
     ),
-    ("run noise.csv", "the input is not recognised among t, a, b; give --output CHANNEL; `livebode inspect noise.csv"),
+    (
+        "run noise.csv",
+        "the input is not recognised among t, a, b; name them by --excitation, --input and --output; `livebode inspect",
+    ),
     ("run log.csv --output yy", "did you mean 'y'?"),
     ("run log.csv --excitation w --input u --output y --lines 20-140 --window 100", "cannot be read"),
     ("run log.csv --excitation w --input u --output y --lines 55 --window 100", "the nearest lines are 50 and 60 Hz"),

@@ -246,17 +246,14 @@ def _axis(recordings: list[Location], specified: dict[str, dict[str, Any]]) -> A
         for recording in recordings:
             with local_copy(recording) as path:
                 read_head(path)  # a file that is missing or a directory is the first thing to mend
-        raise _output_missing(recordings[0], "the output channel is not named")
+        raise _unnamed(recordings[0], "the output channel is not named", "give --output CHANNEL", argument="output")
     log = recordings if len(recordings) > 1 else recordings[0]
     return Axis.of(specified | {"source": source | {"log": log}}, "the options")
 
 
-def _output_missing(recording: Location, wrong: str) -> UsageError:
+def _unnamed(recording: Location, wrong: str, remedy: str, **facts: object) -> UsageError:
     words = command_line("livebode", "inspect", str(recording), "--out", "axis.toml")
-    return UsageError(
-        "missing", wrong, f"give --output CHANNEL; `{words}` lists the channels and proposes their roles",
-        argument="output",
-    )  # fmt: skip
+    return UsageError("missing", wrong, f"{remedy}; `{words}` lists the channels and proposes their roles", **facts)
 
 
 def _proposed_roles(recording: Location, source: Mapping[str, Any]) -> tuple[dict[str, str], dict[str, str]]:
@@ -267,16 +264,18 @@ def _proposed_roles(recording: Location, source: Mapping[str, Any]) -> tuple[dic
     from livebode.preparation import Proposals, suitable_estimator
     from livebode.sources import open_log
 
+    remedy, options = "name them by --excitation, --input and --output", ["--excitation", "--input", "--output"]
     log = open_log(recording, rate_hz=source.get("rate_hz"), time=source.get("time"), dbc=source.get("dbc"))
     roles = Proposals(log).roles()
     roles.pop("schedule")
     if missing := [role for role in ("input", "output") if roles[role].channel is None]:
         names = ", ".join(channel.name for channel in log.channels)
-        raise _output_missing(recording, f"no channel is named, and the {missing[0]} is not recognised among {names}")
+        wrong = f"no channel is named, and the {missing[0]} is not recognised among {names}"
+        raise _unnamed(recording, wrong, remedy, options=options)
     if doubtful := {role: guess for role, guess in roles.items() if guess.others}:
         role, guess = next(iter(doubtful.items()))
         suitable = " or ".join(map(repr, (guess.channel, *guess.others)))
-        raise _output_missing(recording, f"no channel is named, and the {role} could be {suitable}")
+        raise _unnamed(recording, f"no channel is named, and the {role} could be {suitable}", remedy, options=options)
     signals = {role: guess.channel for role, guess in roles.items() if guess.channel is not None}
     estimator, _ = suitable_estimator(log, signals)
     reasons = ", ".join(f"{role} {name} ({roles[role].reason})" for role, name in signals.items())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -14,7 +15,7 @@ from livebode.cli.terminal import is_terminal
 from livebode.locations import location
 
 if TYPE_CHECKING:
-    from livebode.configuration import ServeSection
+    from livebode.dashboard import Dashboard
 
 _DISPLAYS = "DISPLAY", "WAYLAND_DISPLAY"
 
@@ -42,19 +43,28 @@ def view_command(
     """
     from livebode.cli.serving import dashboard_of, print_line, wait_for_the_end
     from livebode.configuration import ServeSection, read_serve_section
+    from livebode.core import ServerError
     from livebode.records import is_run
 
-    runs = runs or [Path("runs")]
+    shown = runs or [Path("runs")]
     section = ServeSection() if axis is None else read_serve_section(axis)
-    if port is None and axis is None and _is_taken(section):
-        port = 0
-    dashboard = dashboard_of(section, port)
-    if len(runs) == 1 and not is_run(runs[0]) and (runs[0].is_dir() or _is_new(runs[0])):
-        dashboard.view_all(runs[0])
-    else:
-        for run in runs:
-            dashboard.view(run)
-    with dashboard:
+
+    def showing(port: int | None) -> Dashboard:
+        dashboard = dashboard_of(section, port)
+        if len(shown) == 1 and not is_run(shown[0]) and (shown[0].is_dir() or _is_new(shown[0])):
+            dashboard.view_all(shown[0])
+        else:
+            for run in shown:
+                dashboard.view(run)
+        return dashboard
+
+    with ExitStack() as stack:
+        try:
+            dashboard = stack.enter_context(showing(port))
+        except ServerError as error:  # the page of another directory has the usual port
+            if port is not None or axis is not None or error.code != "server.port-taken":
+                raise
+            dashboard = stack.enter_context(showing(0))
         print_line(f"the dashboard is at {dashboard.url}")
         if not no_browser and _has_screen():
             import webbrowser
@@ -70,18 +80,6 @@ def _is_new(directory: Path) -> bool:
     if os.path.lexists(directory) or not directory.parent.is_dir():
         return False
     return not any(is_run(path) for path in directory.parent.iterdir())
-
-
-def _is_taken(section: ServeSection) -> bool:
-    """Whether another program, such as the page of another directory, has the usual port."""
-    from livebode.core import ServerError
-    from livebode.dashboard import ServerSettings, listening
-
-    try:
-        listening(ServerSettings.of(section)).close()
-    except ServerError as error:
-        return error.code == "server.port-taken"
-    return False
 
 
 def _has_screen() -> bool:
