@@ -56,7 +56,7 @@ MISTAKES = [
     ("run log.csv --input u", "the output channel is not named"),
     (
         "run axes.csv",
-        "the output could be 'speed1' or 'speed2'; name them by --excitation, --input and --output; `livebode inspect axes",
+        "the output could be 'speed1' or 'speed2'; name them by --excitation, --input and --output; `livebode",
     ),
     (
         "run noise.csv",
