@@ -21,7 +21,7 @@ from livebode.fitting import mean_response
 from livebode.preparation import UnevenSource
 from livebode.simulation import TwoMassLoop, TwoMassPlant
 from livebode.simulation.two_mass_loop import RATE_HZ
-from livebode.sources import Chunk, Column, Recording, UnevenLog
+from livebode.sources import Chunk, Column, DeclaredQuantities, Recording, UnevenLog
 from studies.common import Floats
 
 TARGET = (0.60, 0.95)
@@ -73,7 +73,7 @@ class MemoryRecording(Recording):
 
 def uneven_log(channels: Mapping[str, tuple[Floats, Floats]], rate_hz: float) -> UnevenLog:
     """A log of these channels, the first of which is the reference, on a grid of this rate."""
-    return UnevenLog(MemoryRecording(channels), list(channels), rate_hz, None, 1 << 16, {}, None)
+    return UnevenLog(MemoryRecording(channels), list(channels), rate_hz, None, 1 << 16, DeclaredQuantities(), None)
 
 
 def ticks(rate_hz: float, jitter: float, lost: float, count: int, rng: np.random.Generator) -> NDArray[np.int64]:

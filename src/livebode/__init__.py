@@ -13,7 +13,7 @@ The same without a machine::
     >>> block, _ = livebode.example_axis().run()        # a simulated belt axis, for a second
     >>> response = livebode.frf(block["w"], block["u"], block["velocity"], fs=4000)
     >>> response.magnitude_db.round(1)[:3]
-    array([  2.6,  -2.8, -13.4])
+    array([  2.6,  -2.9, -12.7])
     >>> response(60.0).round(2)                         # the value at a measured line
     np.complex128(4.2-1.63j)
     >>> axes = response.plot()                          # Bode; also "nyquist", "nichols"

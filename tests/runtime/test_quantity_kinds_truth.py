@@ -20,7 +20,7 @@ from livebode.estimation import Settings, Tracker
 from livebode.records import RUN, RunRecord
 from livebode.records.summary_file import to_document
 from livebode.runtime import Destination, run
-from livebode.sources import ChannelQuantities, open_log
+from livebode.sources import DeclaredQuantities, open_log
 from livebode.sources.live import SourceSettings, SpectraBatch, open_source
 from livebode_design.measured_axis import MeasuredAxis, MeasuredSection
 from tests.support.command import LINES, signals, write_csv, write_parquet
@@ -172,5 +172,5 @@ def test_spectra_of_a_drive_carry_the_declared_kind() -> None:
     sums = np.ones((2, 1, len(LINES)), dtype=np.complex128)
     batch = SpectraBatch(0, sums, np.zeros((1, 1)), np.zeros(1, dtype=np.uint32), layout, 1000.0)
     assert [channel.kind for channel in batch.channels] == ["current", "other"]
-    block = batch.in_si(ChannelQuantities({"y": "velocity"})).block(0, 0, False)
+    block = batch.in_si(DeclaredQuantities({"y": "velocity"})).block(0, 0, False)
     assert [(channel.name, channel.kind) for channel in block.channels] == [("u", "current"), ("y", "velocity")]

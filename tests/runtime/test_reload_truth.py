@@ -21,7 +21,7 @@ from tests.support.session_process import SHARED, Running, block, check_samples,
 
 LINES = Lines.parse("50,100,200", 1000.0, 100)
 SETTINGS = Settings(lines=LINES, output="y", input="u", excitation="w", schedule="n", hop=20)
-FIT = '[axes.x.fit]\nmodel = "rigid"\n'
+FIT = '[axes.x.fit]\nmodel = "two-mass-gain"\n'
 
 
 def one(machine: Machine, shared: str = SHARED) -> str:

@@ -21,7 +21,7 @@ from livebode.core import Channel, ConfigError, SpectraLayout, UsageError
 from livebode.fitting import Fit
 from livebode.records import RunRecord
 from livebode.runtime import Destination, run
-from livebode.sources import ChannelQuantities, open_log
+from livebode.sources import DeclaredQuantities, open_log
 from livebode.sources.live import Batch, SourceSettings, SpectraBatch, encode_line, open_source
 from livebode.sources.quantities import kind_by_name, unit_by_name
 from tests.support.command import write_parquet
@@ -256,12 +256,12 @@ def test_spectra_of_a_drive_are_converted_with_what_they_are_of() -> None:
     )
     sums = np.asarray(np.arange(8.0).reshape(2, 2, 2) + 1j, dtype=np.complex128)
     batch = SpectraBatch(0, sums, np.array([[5.0, 7.0]]), np.zeros(2, dtype=np.uint32), layout, 1000.0)
-    found = batch.in_si(ChannelQuantities(units={"u": "0.024 N m"}))
+    found = batch.in_si(DeclaredQuantities(units={"u": "0.024 N m"}))
     assert [channel.unit for channel in found.channels] == ["N m", "rad/s", "m"]
     np.testing.assert_allclose(found.sums, sums * np.array([0.024, pi / 30])[:, np.newaxis, np.newaxis])
     np.testing.assert_allclose(found.values, [[0.005, 0.007]])
     assert found.layout.subtracted == pytest.approx((0.072, 2 * pi))
-    np.testing.assert_array_equal(found.in_si(ChannelQuantities()).sums, found.sums)
+    np.testing.assert_array_equal(found.in_si(DeclaredQuantities()).sums, found.sums)
 
 
 @pytest.mark.parametrize(
@@ -306,7 +306,7 @@ def test_units_are_found_wherever_a_drive_writes_them(head: str, encoding: str, 
 @pytest.mark.parametrize("unit", ["0.024 foo", "0 N m", "1/0 rev", "1e400 N m", "-2 N m"])
 def test_a_quantity_that_is_none_is_refused_before_anything_is_read(unit: str) -> None:
     with refused(UsageError, "unreadable", argument="units", channel="u", value=unit):
-        ChannelQuantities(units={"u": unit})
+        DeclaredQuantities(units={"u": unit})
     with pytest.raises(ConfigError, match=r"source\.units"):
         Axis.of({"source": {"log": "a.csv", "units": {"u": unit}}, "signals": {"output": "y"}}, "axis.toml")
 

@@ -8,7 +8,7 @@ from typing import Any
 from livebode.configuration.axis import Axis
 from livebode.estimates import RESPONSE
 from livebode.locations import Location
-from livebode.sources import ChannelQuantities, Log, even_or_uneven_log, located, log_of, open_file
+from livebode.sources import DeclaredQuantities, Log, even_or_uneven_log, located, log_of, open_file
 
 _NAMES = {
     "signals": ("outputs", "inputs", "excitations", "schedule", "ready"),
@@ -74,5 +74,5 @@ def _renamed(section: Any, keys: tuple[str, ...], shared: Callable[[str], str]) 
 
 def _reading(axis: Axis) -> dict[str, Any]:
     source = axis.source
-    quantities = ChannelQuantities(source.kinds, source.units)
+    quantities = DeclaredQuantities(source.kinds, source.units)
     return {"rate_hz": source.rate_hz, "time": source.time, "quantities": quantities, "clock": source.clock}

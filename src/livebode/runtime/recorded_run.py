@@ -13,7 +13,7 @@ import numpy as np
 from livebode.core import SI_UNITS, Channel, LivebodeError, RecordError, RunClock
 from livebode.records import RunRecord, channels_of
 from livebode.runtime.sender_numbers import NumberedFrom, SenderNumbers
-from livebode.sources import ChannelQuantities
+from livebode.sources import DeclaredQuantities
 from livebode.sources.live import (
     VALUES_MAX,
     Address,
@@ -51,7 +51,7 @@ class RecordedRun:
             )
         summary = self._run.summary
         kinds = summary.get("configuration", {}).get("source", {}).get("kinds") or {}
-        self.channels: tuple[Channel, ...] = ChannelQuantities(kinds).of(channels_of(first.schema))
+        self.channels: tuple[Channel, ...] = DeclaredQuantities(kinds).of(channels_of(first.schema))
         self.rate_hz = float(self._run.found["rate_hz"])
         pieces = SenderNumbers.of(summary.get("numbering", ())).pieces
         begun = int(first["sample"][0])

@@ -16,7 +16,7 @@ from livebode.sources.opening import UNEVEN as UNEVEN
 from livebode.sources.opening import even_or_uneven_log as even_or_uneven_log
 from livebode.sources.opening import log_of as log_of
 from livebode.sources.opening import open_log as open_log
-from livebode.sources.quantities import ChannelQuantities as ChannelQuantities
+from livebode.sources.quantities import DeclaredQuantities as DeclaredQuantities
 from livebode.sources.recording import COLUMNS_MAX as COLUMNS_MAX
 from livebode.sources.recording import Chunk as Chunk
 from livebode.sources.recording import Column as Column

@@ -14,7 +14,7 @@ from livebode.core import Block, Channel, ClockKind, LivebodeError, RecordingErr
 from livebode.locations import Location
 from livebode.sources.expressions import Expression, computed_blocks
 from livebode.sources.naming import explained, found_channel, resolve
-from livebode.sources.quantities import ChannelQuantities, in_si
+from livebode.sources.quantities import DeclaredQuantities, in_si
 from livebode.sources.recording import Chunk, Column, Recording, Skipped, guarded, located, stacked
 from livebode.sources.timing import Clock, Timing
 
@@ -52,14 +52,14 @@ class Log:
         chosen: Sequence[str],
         clock: Clock,
         block_samples: int,
-        quantities: ChannelQuantities,
+        quantities: DeclaredQuantities,
     ) -> None:
         self._recording = recording
         self._columns = tuple(columns)
         self._chosen = tuple(chosen)
         self._clock = clock
         self._block_samples = block_samples
-        self._quantities: ChannelQuantities | None = quantities
+        self._quantities: DeclaredQuantities | None = quantities
         self.first = 0
         """Number of the first sample that `blocks` reads."""
         self._stop: int | None = None

@@ -16,7 +16,7 @@ from livebode.locations import Url, location
 from livebode.sources.formats import open_file
 from livebode.sources.log import Log, checked_block_samples
 from livebode.sources.naming import explained, reasons, resolve, together
-from livebode.sources.quantities import ChannelQuantities
+from livebode.sources.quantities import DeclaredQuantities
 from livebode.sources.recording import Column, Recording, guarded, located
 from livebode.sources.timing import (
     JITTER_MAX,
@@ -114,7 +114,7 @@ def open_log(
         time=time,
         channels=channels,
         block_samples=block_samples,
-        quantities=ChannelQuantities(kinds or {}, units or {}),
+        quantities=DeclaredQuantities(kinds or {}, units or {}),
         clock=clock,
     )
 
@@ -126,7 +126,7 @@ def log_of(
     time: str | None = None,
     channels: Sequence[str] | None = None,
     block_samples: int = 65536,
-    quantities: ChannelQuantities | None = None,
+    quantities: DeclaredQuantities | None = None,
     clock: ClockKind | None = None,
 ) -> Log:
     """The log of a recording that `open_file` opened; parameters and errors as of `open_log`.
@@ -143,7 +143,7 @@ def log_of(
         )
     checked_block_samples(block_samples)
     with located(recording.place), explained(recording.skipped):
-        log = _log_of(recording, rate_hz, time, channels, block_samples, quantities or ChannelQuantities(), clock)
+        log = _log_of(recording, rate_hz, time, channels, block_samples, quantities or DeclaredQuantities(), clock)
     _logger.info("%s: %s, %d channels at %.9g Hz", log.path, log.format, len(log.channels), log.rate_hz)
     return log
 
@@ -170,7 +170,7 @@ def _log_of(
     time: str | None,
     channels: Sequence[str] | None,
     block_samples: int,
-    quantities: ChannelQuantities,
+    quantities: DeclaredQuantities,
     clock_kind: ClockKind | None,
 ) -> Log:
     columns = together(recording, channels, time)

@@ -70,7 +70,7 @@ def unit_by_name(name: str) -> str:
 
 
 @dataclass(frozen=True)
-class ChannelQuantities:
+class DeclaredQuantities:
     """What the configuration declares of some channels, by name, before their names and units in the source.
 
     Parameters
@@ -87,9 +87,9 @@ class ChannelQuantities:
 
     Examples
     --------
-    >>> ChannelQuantities(units={"load": "0.024 N m"}).channel("load", "%")
+    >>> DeclaredQuantities(units={"load": "0.024 N m"}).channel("load", "%")
     Channel(name='load', unit='N m', kind='torque')
-    >>> ChannelQuantities().channel("Istdrehzahl", "1/min").factor, ChannelQuantities().channel("Actual torque", "%")
+    >>> DeclaredQuantities().channel("Istdrehzahl", "1/min").factor, DeclaredQuantities().channel("Actual torque", "%")
     (0.10471975511965977, Channel(name='Actual torque', unit='%', kind='torque'))
     """
 
@@ -113,10 +113,10 @@ class ChannelQuantities:
         """The channels of which something is declared, each once."""
         return list(dict.fromkeys([*self.kinds, *self.units]))
 
-    def renamed(self, names: Mapping[str, str]) -> ChannelQuantities:
+    def renamed(self, names: Mapping[str, str]) -> DeclaredQuantities:
         """The same of channels with other names."""
         kinds = {names.get(name, name): kind for name, kind in self.kinds.items()}
-        return ChannelQuantities(kinds, {names.get(name, name): unit for name, unit in self.units.items()})
+        return DeclaredQuantities(kinds, {names.get(name, name): unit for name, unit in self.units.items()})
 
     def channel(self, name: str, unit: str, of: str | None = None) -> Channel:
         """The channel `name` whose unit in the source is `unit`: with its SI unit, if that is recognised.

@@ -15,7 +15,7 @@ from livebode.core import Block, Channel, ClockKind, RecordingError, UsageError,
 from livebode.sources.expressions import Expression
 from livebode.sources.log import Log
 from livebode.sources.naming import found_channel, resolve, together
-from livebode.sources.quantities import ChannelQuantities, in_si
+from livebode.sources.quantities import DeclaredQuantities, in_si
 from livebode.sources.recording import Column, Recording, Skipped, guarded, located, stacked
 from livebode.sources.resample import Resampler
 from livebode.sources.stamps import Stamps, stamps_of
@@ -57,7 +57,7 @@ class UnevenLog(Log):
         rate_hz: float | None,
         time: str | None,
         block_samples: int,
-        quantities: ChannelQuantities,
+        quantities: DeclaredQuantities,
         clock_kind: ClockKind | None,
     ) -> None:
         self._time, self._given_hz = time, rate_hz
@@ -243,7 +243,7 @@ def uneven_log_of(
     rate_hz: float | None = None,
     time: str | None = None,
     block_samples: int = 65536,
-    quantities: ChannelQuantities | None = None,
+    quantities: DeclaredQuantities | None = None,
     clock: ClockKind | None = None,
 ) -> UnevenLog:
     """The log of a recording whose channels have clocks of their own, or a clock that jitters.
@@ -270,7 +270,7 @@ def uneven_log_of(
         everything = recording.columns
         for name in channels:
             found_channel(name, everything, everything)
-        declared = quantities or ChannelQuantities()
+        declared = quantities or DeclaredQuantities()
         declared = declared.renamed({name: resolve(name, everything, everything).name for name in declared.names})
         chosen = list(channels) or _most(recording, time)
         return UnevenLog(recording, chosen, rate_hz, time, block_samples, declared, clock)

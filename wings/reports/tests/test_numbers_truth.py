@@ -75,7 +75,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     done = livebode("report", folder / "run", "--on", folder / "fresh.parquet", "--appendix")
     assert done.code == 0, done.err
     files = [str(folder / "run" / name) for name in ("report.html", "report.pdf")]
-    assert done.out.splitlines() == [*files, "limits: 3 met, 1 failed"]
+    assert done.out.splitlines()[:3] == [*files, "limits: 3 met, 1 failed"]
     return folder / "run"
 
 
@@ -335,6 +335,6 @@ def test_before_and_after_draw_both_means_and_mark_what_differs(tmp_path: Path) 
     np.testing.assert_allclose([float(row[9]) for row in lines.rows], 100 * seen, rtol=0.05)
     assert ("smallest detectable change of a line", f"≥ {100 * seen.max():.2g} %") in document.facts  # of all alike
     np.testing.assert_array_equal([line["detectable"] for line in comparison.plain()["lines"]], seen)
-    assert done.out.split()[-2:] == [str(tmp_path / "both.html"), str(tmp_path / "both.pdf")]
+    assert {str(tmp_path / "both.html"), str(tmp_path / "both.pdf")} <= set(done.out.split())
     assert "lines of 7 differ" in Page((tmp_path / "both.html").read_text("utf-8")).text
     assert "lines of 7 differ" in " ".join(PdfReader(tmp_path / "both.pdf").pages[0].extract_text().split())

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from livebode.core import Block, Channel, SourceError
 from livebode.sources.live.position import Mark, Origin
-from livebode.sources.quantities import ChannelQuantities, in_si
+from livebode.sources.quantities import DeclaredQuantities, in_si
 
 CHANNELS_MAX = 1024
 VALUES_MAX = 1 << 20
@@ -86,7 +86,7 @@ class Batch:
     def nbytes(self) -> int:
         return int(self.data.nbytes)
 
-    def in_si(self, quantities: ChannelQuantities) -> Batch:
+    def in_si(self, quantities: DeclaredQuantities) -> Batch:
         """The same in SI units, from those of the sender."""
         channels = quantities.of(self.channels)
         return self if channels == self.channels else replace(self, data=in_si(self.data, channels), channels=channels)

@@ -23,7 +23,7 @@ from pydantic_core import PydanticCustomError
 from livebode.core import Channel, ClockKind, ConfigError, DeferredModel, QuantityKind, UsageError
 from livebode.locations import Location, Url, location
 from livebode.plugins import loaded, named
-from livebode.sources.quantities import ChannelQuantities
+from livebode.sources.quantities import DeclaredQuantities
 from livebode.sources.units import split_unit
 
 LimitUnit = Literal["s", "samples", "periods"]
@@ -118,7 +118,7 @@ Limit = Annotated[float | Annotated[str, Field(json_schema_extra={"pattern": PAT
 
 
 def _checked_units(units: dict[str, str]) -> dict[str, str]:
-    return dict(ChannelQuantities(units=units).units)
+    return dict(DeclaredQuantities(units=units).units)
 
 
 class SourceKeys(DeferredModel):

@@ -33,7 +33,7 @@ from livebode.sources.live.settled import SettledDeliveries
 from livebode.sources.live.source_events import SourceEvents
 from livebode.sources.live.spectra_batch import AnyBatch
 from livebode.sources.live.unconfirmed import CONFIRMED
-from livebode.sources.quantities import ChannelQuantities
+from livebode.sources.quantities import DeclaredQuantities
 
 TICK_S = 0.1
 """Longest time until a request to end is detected."""
@@ -85,7 +85,7 @@ class LiveSource(ABC):
 
     def __init__(self, settings: SourceSettings, address: Address) -> None:
         self.settings, self.address = settings, address
-        self._quantities = ChannelQuantities(settings.kinds, settings.units)
+        self._quantities = DeclaredQuantities(settings.kinds, settings.units)
         # Also of a source of another package: what is below "livebode" is in its log.
         self._logger = logging.getLogger(f"{__package__}.{type(self).__module__.rpartition('.')[2]}")
         self._events = SourceEvents(log=self._log)

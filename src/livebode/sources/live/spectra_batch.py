@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from livebode.core import Channel, SourceError, Spectra, SpectraLayout, rms
 from livebode.sources.live.batch import VALUES_MAX, Batch, LiveBlock, check_numbers
 from livebode.sources.live.position import Mark, Origin
-from livebode.sources.quantities import ChannelQuantities, in_si
+from livebode.sources.quantities import DeclaredQuantities, in_si
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +101,7 @@ class SpectraBatch:
     def nbytes(self) -> int:
         return int(self.sums.nbytes + self.values.nbytes + self.state.nbytes)
 
-    def in_si(self, quantities: ChannelQuantities) -> SpectraBatch:
+    def in_si(self, quantities: DeclaredQuantities) -> SpectraBatch:
         """The same in SI units, from those of the sender."""
         layout = self.layout
         signals, values = quantities.of(layout.signals), quantities.of(layout.values)

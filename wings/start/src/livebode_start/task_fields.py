@@ -67,7 +67,7 @@ def key_fields(file: str, keys: Sequence[str]) -> list[TaskField]:
     """The fields of keys of a kind of TOML file, as "belt.drive.rate_hz", from its schema.
 
     >>> key_fields("axis", ["tracking.forgetting"])[0].default
-    '0.8'
+    '0.8; 1 for the average of a recording'
     """
     schema = loaded(named("files")[file].schema)()
     return [_key_field(key, _described(schema, key)) for key in keys]

@@ -23,7 +23,7 @@ from livebode.language import Message
 from livebode.monitoring import places
 from livebode.preparation import live_follower
 from livebode.runtime import ChangeDetection, SingleResponse
-from livebode.sources import ChannelQuantities
+from livebode.sources import DeclaredQuantities
 from livebode.sources.live import LiveBlock, Sequencer, SourceEvents, join_blocks
 from livebode_plant.fleet.alike_axes import (
     NO_ROWS,
@@ -101,7 +101,7 @@ class AxisStream(StatefulBase):
         self._limits = EventLimits()
         self._fit_period = 0
         settings = axis.source
-        self._quantities = ChannelQuantities(settings.kinds, settings.units)
+        self._quantities = DeclaredQuantities(settings.kinds, settings.units)
         self._sequencer = Sequencer(self._events, reorder=settings.reorder_batches, rate_hz=settings.rate_hz)
         self._pipeline: SingleResponse | None = None
         self._added: list[_MessageGroup] = []
