@@ -15,7 +15,7 @@ The same without a machine::
     >>> response.magnitude_db.round(1)[:3]
     array([  2.6,  -2.9, -12.7])
     >>> response(60.0).round(2)                         # the value at a measured line
-    np.complex128(4.2-1.63j)
+    np.complex128(4.3-1.7j)
     >>> axes = response.plot()                          # Bode; also "nyquist", "nichols"
     >>> frame = response.to_pandas()                    # or to_xarray(), to_frd()
 
