@@ -46,7 +46,7 @@ def test_a_process_that_fails_prints_one_object_and_ends_with_2(tmp_path: Path) 
     assert (done.returncode, done.stdout) == (2, "")
     error = json.loads(done.stderr)["error"]
     assert error["code"] == "usage.missing"
-    assert error["facts"] == {"argument": "output", "options": ["--output"]}
+    assert error["facts"] == {"options": ["--excitation", "--input", "--output"]}
     assert list(tmp_path.iterdir()) == [log]
 
 
