@@ -6,7 +6,6 @@ import os
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -30,7 +29,7 @@ from livebode.locations import Location, Url, local_copy, location
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from livebode.preparation import ChannelSummary, Guess, Proposals, Recorded, Settled
+    from livebode.preparation import ChannelSummary, Guess, Proposals, Settled
     from livebode.sources import Log
 
 _NONE = "-"
@@ -72,8 +71,7 @@ def write_configuration(
     from livebode.preparation import Proposals
     from livebode.records import to_json
 
-    recording: Recorded
-    source: dict[str, Any]
+    source: Mapping[str, Any]
 
     asks = not (yes or as_json)
     _check_replaceable(out, force)
@@ -113,10 +111,8 @@ def write_configuration(
     return NextCommand("run", out)
 
 
-def _heard(url: str, rate: float | None) -> tuple[Recorded, dict[str, Any]]:
+def _heard(url: str, rate: float | None) -> tuple[Log, Mapping[str, Any]]:
     """What came from a live source, and its section [source]."""
-    from livebode.sources.live import HeardSamples
-
     found = heard(url)
     if found.block is None:
         raise SourceError(
@@ -125,8 +121,7 @@ def _heard(url: str, rate: float | None) -> tuple[Recorded, dict[str, Any]]:
             "docs/how-to/live.md describes what is read; correct the address or the sender",
             address=url,
         ).at(url)
-    block = found.block if rate is None else replace(found.block, rate_hz=rate)
-    return HeardSamples(block, url), {**found.source, "rate_hz": block.rate_hz}
+    return found.log(rate)
 
 
 def _check_recording(place: Location) -> None:

@@ -28,7 +28,7 @@ from livebode.estimation import response_unit, welch
 from livebode.fitting import RunningMean
 from livebode.preparation import follower_of, make_settings, suitable_estimator
 from livebode.runtime import follow_recording
-from livebode.sources import Chunk, Column, Log, Recording, log_of, split_unit, time_rank
+from livebode.sources import ArrayRecording, Column, Log, Recording, log_of, split_unit, time_rank
 
 FRFEstimator = Literal["auto", "joint", "direct", "lpm", "welch"]
 FRFLines = str | Sequence[float] | NDArray[np.floating[Any]] | NDArray[np.integer[Any]]
@@ -269,25 +269,17 @@ class _Settings:
         }
 
 
-class _Arrays(Recording):
-    """Arrays as a recording: channels w, u, y, and the time if there is one."""
-
-    format = "arrays"
-
-    def __init__(self, name: str, series: Mapping[str, NamedSamples]) -> None:
-        super().__init__(Path(name))
-        samples = next(iter(series.values())).values.size
-        self.columns = tuple(
-            Column(role, one.unit or split_unit(one.name)[1], samples, key=one.values) for role, one in series.items()
-        )
-        if timed := next((one.time for one in series.values() if one.time is not None), None):
-            heading, values = timed
-            time = Column(*split_unit(heading), samples, key=values)
-            self.columns += (time,) if time_rank(time) is not None else ()
-
-    def chunks(self, columns: Sequence[Column], rows: int) -> Iterator[Chunk]:
-        for first in range(0, columns[0].key.size, rows):
-            yield [column.key[first : first + rows] for column in columns]
+def _recording(name: str, series: Mapping[str, NamedSamples]) -> ArrayRecording:
+    """Signals as a recording: channels w, u, y, and the time if there is one."""
+    samples = next(iter(series.values())).values.size
+    columns = [
+        Column(role, one.unit or split_unit(one.name)[1], samples, key=one.values) for role, one in series.items()
+    ]
+    if timed := next((one.time for one in series.values() if one.time is not None), None):
+        heading, values = timed
+        time = Column(*split_unit(heading), samples, key=values)
+        columns += [time] if time_rank(time) is not None else []
+    return ArrayRecording(Path(name), columns)
 
 
 @dataclass(frozen=True)
@@ -311,7 +303,7 @@ class _Recorded:
                 argument="estimator",
             )
         with _by_argument(name):
-            log = _log(_Arrays(name, series_of(**signals)), settings.fs)
+            log = _log(_recording(name, series_of(**signals)), settings.fs)
             estimator = suitable_estimator(log, roles)[0] if estimator == "auto" else estimator
             sections["tracking"]["estimator"] = estimator
             axis = Axis.of({"source": {"log": name}, "signals": roles} | sections, name)

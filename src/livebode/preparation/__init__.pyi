@@ -30,7 +30,6 @@ from livebode.preparation.inspection import inspect as inspect
 from livebode.preparation.part import chosen_part as chosen_part
 from livebode.preparation.part import configured_part as configured_part
 from livebode.preparation.part import motion_part as motion_part
-from livebode.preparation.plan import Recorded as Recorded
 from livebode.preparation.plan import beginnings as beginnings
 from livebode.preparation.plan import hop_event as hop_event
 from livebode.preparation.plan import roles_in_doubt as roles_in_doubt

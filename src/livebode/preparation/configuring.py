@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import tomli_w
 
@@ -15,7 +15,7 @@ from livebode.excitation import recognise
 from livebode.language import Message
 from livebode.preparation.followers import make_settings
 from livebode.preparation.nonperiodic import suits_lpm
-from livebode.preparation.plan import Recorded, beginning, roles_in_doubt
+from livebode.preparation.plan import beginning, roles_in_doubt
 from livebode.sources import Log
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ class Settled:
         return "\n".join(lines) + "\n"
 
 
-def suitable_estimator(log: Recorded, signals: Mapping[str, str]) -> tuple[str, str]:
+def suitable_estimator(log: Log, signals: Mapping[str, str]) -> tuple[str, str]:
     """The estimator for these roles, and why: by whether the excitation, or else the input, repeats."""
     reference = signals.get("excitation") or signals.get("input")
     if reference is None:
@@ -115,7 +115,7 @@ def tables_of(
     } | ({} if model == "none" else {"fit": {"model": model}})
 
 
-def settled(log: Recorded, tables: Tables, reasons: Mapping[str, str]) -> Settled:
+def settled(log: Log, tables: Tables, reasons: Mapping[str, str]) -> Settled:
     """Check the tables with the recording, and add lines and window if the excitation repeats.
 
     Raises
@@ -126,9 +126,8 @@ def settled(log: Recorded, tables: Tables, reasons: Mapping[str, str]) -> Settle
     axis = Axis.of(tables, "the answers")
     if axis.fit is not None:
         check_fit(axis.fit)
-    recording = cast(Log, log)  # what a live source sent has all that is used of one
-    settings = make_settings(axis, recording)
-    doubts = roles_in_doubt(axis, recording, settings)
+    settings = make_settings(axis, log)
+    doubts = roles_in_doubt(axis, log, settings)
     comments = {("signals", role): reason for role, reason in reasons.items()}
     if not settings.periodic:
         return Settled(tables, comments, doubts)

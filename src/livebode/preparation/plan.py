@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 
 from livebode.configuration import Axis
-from livebode.core import ANY_EXCITATION, Block, Channel, ConfigError, Event, Lines, LivebodeError
+from livebode.core import ANY_EXCITATION, Block, ConfigError, Event, Lines, LivebodeError
 from livebode.estimation import FORGETTING, RippleOrder, Settings, default_hop, divisors
 from livebode.language import Message
 from livebode.preparation.checks import check_length
@@ -124,27 +124,6 @@ class RecordedSource(Protocol):
     def first(self) -> int: ...
 
     def blocks(self, channels: Sequence[str] | None = None) -> Iterator[Block]: ...
-
-
-class Recorded(RecordedSource, Protocol):
-    """Samples that can be read again: a Log, or what a live source sent."""
-
-    @property
-    def path(self) -> object: ...
-
-    @property
-    def format(self) -> str: ...
-
-    @property
-    def channels(self) -> tuple[Channel, ...]: ...
-
-    @property
-    def rate_hz(self) -> float: ...
-
-    @property
-    def samples(self) -> int | None: ...
-
-    def naming(self, names: Sequence[str]) -> Recorded: ...
 
 
 def window_in_doubt(axis: Axis, log: Log, settings: Settings) -> list[Event]:

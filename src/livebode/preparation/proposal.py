@@ -14,7 +14,8 @@ from livebode.language import Message
 from livebode.preparation._role_evidence import RoleEvidence
 from livebode.preparation._role_spectra import DRIVING, NAMED_INPUT, NAMED_OUTPUT, ChannelQuantities
 from livebode.preparation.contents import ChannelSummary, contents_of
-from livebode.preparation.plan import Recorded, beginnings
+from livebode.preparation.plan import beginnings
+from livebode.sources import Log
 
 _SEARCHED = 1 << 18  # samples: enough for some periods of an excitation
 _CERTAIN = 3  # score of a proposal
@@ -82,7 +83,7 @@ class Proposals:
         The channels without time and counters.
     """
 
-    def __init__(self, log: Recorded) -> None:
+    def __init__(self, log: Log) -> None:
         self.log = log
         names = list(next(log.blocks()).names)  # without the time
         samples = dict(zip(names, beginnings(log, names, _SEARCHED)))

@@ -18,6 +18,7 @@ from livebode.sources.opening import log_of as log_of
 from livebode.sources.opening import open_log as open_log
 from livebode.sources.quantities import DeclaredQuantities as DeclaredQuantities
 from livebode.sources.recording import COLUMNS_MAX as COLUMNS_MAX
+from livebode.sources.recording import ArrayRecording as ArrayRecording
 from livebode.sources.recording import Chunk as Chunk
 from livebode.sources.recording import Column as Column
 from livebode.sources.recording import Recording as Recording

@@ -127,6 +127,35 @@ class Recording(ABC):
         """The values of `columns` (one common length) from the first to the last, about `rows` at a time."""
 
 
+class ArrayRecording(Recording):
+    """Columns in memory: signals of a Python session, or what a live source sent.
+
+    Parameters
+    ----------
+    place
+        Where they are from, for errors.
+    columns
+        Each with its samples as `key`, shape (samples,); all of one length.
+    """
+
+    format = "arrays"
+
+    def __init__(self, place: Location, columns: Sequence[Column]) -> None:
+        super().__init__(Path(str(place)))
+        self._place = place
+        self.columns = tuple(columns)
+
+    @property
+    def place(self) -> Location:
+        """Where they are from."""
+        return self._place
+
+    def chunks(self, columns: Sequence[Column], rows: int) -> Iterator[Chunk]:
+        """The samples of these columns, about `rows` at a time."""
+        for first in range(0, columns[0].key.size, rows):
+            yield [column.key[first : first + rows] for column in columns]
+
+
 def _without_prefix(name: str, prefix: str) -> str:
     """The name without the prefix at its beginning, or at that of a channel in an expression.
 

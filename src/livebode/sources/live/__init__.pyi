@@ -27,7 +27,6 @@ from livebode.sources.live.framing import read_header as read_header
 from livebode.sources.live.health import Health as Health
 from livebode.sources.live.heard import LISTEN_S as LISTEN_S
 from livebode.sources.live.heard import HeardChannel as HeardChannel
-from livebode.sources.live.heard import HeardSamples as HeardSamples
 from livebode.sources.live.heard import Survey as Survey
 from livebode.sources.live.heard import heard_channels as heard_channels
 from livebode.sources.live.heard import nice_rate as nice_rate

@@ -5,23 +5,29 @@ from __future__ import annotations
 import json
 import time
 from collections import deque
-from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 from threading import Timer
-from typing import Any, Protocol, cast
+from typing import TYPE_CHECKING, Any, Protocol, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import Block, Channel, SourceError
+from livebode.locations import Url
 from livebode.plugins import loaded, named
 from livebode.sources.live.address import parse_address
 from livebode.sources.live.fields import number_fields
 from livebode.sources.live.opening import make_source
 from livebode.sources.live.settings import SourceKeys, SourceSettings
 from livebode.sources.live.source import LiveSource
+from livebode.sources.opening import log_of
 from livebode.sources.quantities import kind_by_name
+from livebode.sources.recording import ArrayRecording, Column
 from livebode.sources.units import split_unit
+
+if TYPE_CHECKING:
+    from livebode.sources.log import Log
 
 LISTEN_S = 3.0
 """How long an address is listened to."""
@@ -82,6 +88,15 @@ class Survey:
     def rate_hz(self) -> float:
         assert self.block is not None
         return self.block.rate_hz
+
+    def log(self, rate_hz: float | None = None) -> tuple[Log, Mapping[str, Any]]:
+        """The samples as a recording, and its section [source]; with another rate than the measured one, if given."""
+        assert self.block is not None
+        rate_hz = rate_hz or self.rate_hz
+        channels, samples = self.block.channels, len(self.block)
+        columns = [Column(c.name, c.unit, samples, key=row) for c, row in zip(channels, self.block.data)]
+        log = log_of(ArrayRecording(Url(self.source["url"]), columns), rate_hz=rate_hz, time="none")
+        return log, {**self.source, "rate_hz": rate_hz}
 
 
 class SurveyFunction(Protocol):
@@ -256,38 +271,3 @@ def unusable_words(messages: Collection[tuple[float, bytes]], trouble: object) -
     newest = list(messages)[-1][1]
     more = "…" if len(newest) > _BYTES_SHOWN else ""
     return f"{trouble}; the newest has {len(newest)} bytes and begins with {newest[:_BYTES_SHOWN]!r}{more}"
-
-
-@dataclass(frozen=True, eq=False)
-class HeardSamples:
-    """The samples of a survey as a recording, for proposals."""
-
-    block: Block
-    path: str
-    format: str = "live"
-    first: int = field(default=0, init=False)
-
-    @property
-    def channels(self) -> tuple[Channel, ...]:
-        return self.block.channels
-
-    @property
-    def rate_hz(self) -> float:
-        return self.block.rate_hz
-
-    @property
-    def samples(self) -> int:
-        return len(self.block)
-
-    def naming(self, names: Sequence[str]) -> HeardSamples:
-        """The same; SourceError for a name that no channel has."""
-        for name in names:
-            self.block[name]
-        return self
-
-    def blocks(self, channels: Sequence[str] | None = None) -> Iterator[Block]:
-        """The one Block with these channels."""
-        names = list(self.block.names if channels is None else channels)
-        labels = {channel.name: channel for channel in self.block.channels}
-        rows = np.array([self.block[name] for name in names])
-        yield Block(rows, tuple(labels[name] for name in names), self.block.rate_hz)

@@ -5,16 +5,12 @@ from __future__ import annotations
 import asyncio
 import re
 from collections import OrderedDict
-from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 from typing import Any
 
-from livebode.core import Block, ServerError, UsageError
+from livebode.core import ServerError, UsageError
 from livebode.language import Message, for_page
-from livebode.locations import Url
 from livebode.plugins import named
-from livebode.sources import Chunk, Column, Log, Recording, log_of
 from livebode.sources.live import Survey, parse_address, survey
 from livebode_start.workspace import harmless_name
 
@@ -23,29 +19,6 @@ LISTENERS_MAX = 2
 HEARD_MAX = 4
 """Addresses whose samples are in memory."""
 _CHANNELS_MAX = 500
-
-
-class HeardRecording(Recording):
-    """The samples of a survey as a recording."""
-
-    format = "live"
-
-    def __init__(self, url: str, block: Block) -> None:
-        super().__init__(Path(url))
-        self._url = Url(url)
-        self.columns = tuple(
-            Column(channel.name, channel.unit, len(block), key=row) for channel, row in zip(block.channels, block.data)
-        )
-
-    @property
-    def place(self) -> Url:
-        """Its address."""
-        return self._url
-
-    def chunks(self, columns: Sequence[Column], rows: int) -> Iterator[Chunk]:
-        """The samples, about `rows` at a time."""
-        for first in range(0, columns[0].key.size, rows):
-            yield [column.key[first : first + rows] for column in columns]
 
 
 class Listening:
@@ -109,14 +82,6 @@ def shown(heard: Survey) -> dict[str, Any]:
     rows = heard.channels[:_CHANNELS_MAX]
     channels = [{"name": c.name, "unit": c.unit, "rate_hz": c.rate_hz, "newest": c.example} for c in rows]
     return {"heard": channels, "rate_measured": "rate_hz" in heard.source}
-
-
-def log_of_heard(heard: Survey, rate_hz: float | None) -> tuple[Log, Mapping[str, Any]]:
-    """The samples of a survey as a recording, and its section [source]."""
-    assert heard.block is not None
-    rate_hz = rate_hz or heard.rate_hz
-    log = log_of(HeardRecording(str(heard.source["url"]), heard.block), rate_hz=rate_hz, time="none")
-    return log, {**heard.source, "rate_hz": rate_hz}
 
 
 def stem_of(url: str) -> str:

@@ -26,7 +26,7 @@ from livebode.preparation import (
 )
 from livebode.sources import Log, open_log
 from livebode.sources.live import Survey
-from livebode_start.listening import log_of_heard, shown
+from livebode_start.listening import shown
 from livebode_start.preview import SignalOverview
 
 OPEN_MAX = 4
@@ -230,7 +230,7 @@ class OpenedRecordings:
         """The samples of a live source as a recording."""
 
         def opened() -> OpenedRecording:
-            log, source = log_of_heard(heard, rate_hz)
+            log, source = heard.log(rate_hz)
             return OpenedRecording(str(heard.source["url"]), source, log, shown(heard))
 
         return self._retained((heard, rate_hz), opened)
