@@ -16,7 +16,8 @@ from hypothesis import strategies as st
 
 from livebode.core import ServerError
 from livebode.records import RunRecord
-from livebode_start.jobs import RUNNING_MAX, CommandJob, JobOrder, Jobs, file_name
+from livebode_start.jobs import RUNNING_MAX, CommandJob, JobOrder, Jobs
+from livebode_start.workspace import file_name
 from tests.support.browser import until
 from tests.support.command import livebode, signals, write_csv
 

@@ -28,7 +28,6 @@ STOP_S = 20.0
 """Time that a cancelled job has to complete what it writes; it is killed after that."""
 CLOSE_S = 5.0
 """The same when the server ends."""
-_NAME_LETTERS_MAX = 64
 _COLUMNS = 100
 _PROGRAM = "from livebode_start.job_process import main; main()"
 _PROGRESS = re.compile(r"livebode: (\d{1,3}) % ")
@@ -103,7 +102,6 @@ class CommandJob:
 
     def plain(self) -> dict[str, Any]:
         """For the page."""
-        lines = list(self.lines)
         return {
             "id": self.id,
             "task": self.order.task,
@@ -113,8 +111,8 @@ class CommandJob:
             "progress": self.progress,
             "code": self.code,
             "arguments": list(self.order.arguments),
-            "sentence": main_sentence(lines, failed=self.code not in (None, 0)),
-            "output": "\n".join(lines),
+            "sentence": self.sentence,
+            "output": "\n".join(list(self.lines)),  # a copy: another thread adds lines
         }
 
     def interrupt(self) -> None:
@@ -254,36 +252,8 @@ def main_sentence(lines: list[str], *, failed: bool) -> str:
             return "\n".join(filled[starts[-1] :]).removeprefix("livebode: ")
         if framed := [found[1] for line in filled if (found := _FRAMED.fullmatch(line.strip()))]:
             return " ".join(framed)
-    lines = [line.strip() for line in filled if not line.startswith("Next: ")]
-    return next((line for line in lines if line.endswith(".")), lines[-1] if lines else "")
-
-
-def file_name(text: object) -> str:
-    """The name of something that a person adds to the directory of the runs.
-
-    Raises
-    ------
-    ServerError
-        If it could be a path, or a name that some system does not have.
-
-    >>> file_name("press 3, before")
-    'press 3, before'
-    """
-    name = text.strip() if isinstance(text, str) else ""
-    usual = re.fullmatch(r"\w[\w .,+=()-]*", name) is not None and not name.endswith(".")
-    if not usual or len(name.encode(errors="replace")) > _NAME_LETTERS_MAX or _reserved(name):
-        raise ServerError(
-            "name-invalid",
-            Message("{name} cannot be the name of a file", name=repr(str(text)[:_NAME_LETTERS_MAX])),
-            Message("use letters, digits, spaces, - and _, at most {count}", count=_NAME_LETTERS_MAX),
-            argument="name",
-        )
-    return name
-
-
-def _reserved(name: str) -> bool:
-    """Whether it is a device of Windows, whatever its ending."""
-    return re.fullmatch(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", name, re.IGNORECASE) is not None
+    said = [line.strip() for line in filled]
+    return next((line for line in said if line.endswith(".")), said[-1] if said else "")
 
 
 def _started(arguments: tuple[str, ...], directory: Path) -> subprocess.Popen[bytes]:

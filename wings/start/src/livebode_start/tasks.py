@@ -17,8 +17,9 @@ import tomli_w
 from livebode.core import ServerError, UsageError, write_whole, writing
 from livebode.language import Message
 from livebode.plugins import named
-from livebode_start.jobs import JobOrder, file_name
+from livebode_start.jobs import JobOrder
 from livebode_start.task_fields import TaskField, key_fields, option_fields, toml_value
+from livebode_start.workspace import file_name
 
 TEXT_LETTERS_MAX = 1000
 LIMITS_MAX = 50

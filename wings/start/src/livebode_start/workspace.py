@@ -18,7 +18,7 @@ from livebode.plugins import tables
 
 NAME_BYTES_MAX = 100
 """Of a name without its ending: run directory, configuration and outbox are named after it."""
-_ENDING_LETTERS_MAX = 12
+_ENDING_LETTERS_MAX, _NAME_LETTERS_MAX = 12, 64
 _FILES_MAX = 1000
 _BESIDE = "../"
 _FORBIDDEN = re.compile(r'[<>:"/\\|?*]')
@@ -49,6 +49,29 @@ def harmless_name(text: str) -> str:
     if not ending and stem.lower().endswith(_OWN):  # where it was cut
         ending = "txt"
     return f"{stem}.{ending}" if ending else stem
+
+
+def file_name(text: object) -> str:
+    """The name of something that a person adds to the directory of the runs.
+
+    Raises
+    ------
+    ServerError
+        If it could be a path, or a name that some system does not have.
+
+    >>> file_name("press 3, before")
+    'press 3, before'
+    """
+    name = text.strip() if isinstance(text, str) else ""
+    usual = re.fullmatch(r"\w[\w .,+=()-]*", name) is not None and not name.endswith(".")
+    if not usual or len(name.encode(errors="replace")) > _NAME_LETTERS_MAX or _DEVICE.fullmatch(name):
+        raise ServerError(
+            "name-invalid",
+            Message("{name} cannot be the name of a file", name=repr(str(text)[:_NAME_LETTERS_MAX])),
+            Message("use letters, digits, spaces, - and _, at most {count}", count=_NAME_LETTERS_MAX),
+            argument="name",
+        )
+    return name
 
 
 class Workspace:
