@@ -1,6 +1,6 @@
 """`python -m studies.arrays`: three arrays to a frequency response, by livebode, SciPy and pyFRF.
 
-All get the same recordings of a servo in closed loop (`studies.servo`). With --write the table of
+All get the same recordings of a servo in closed loop (`tools.two_mass_servo`). With --write the table of
 docs/explanation/scipy.md is updated. pyFRF is in requirements-bench.lock (`make bench`).
 """
 
@@ -19,14 +19,16 @@ from numpy.typing import NDArray
 from scipy import signal
 
 import livebode
-from studies.servo import LINES_HZ, PERIOD, RATE_HZ, Signals, measured, multisine, plant
+from tools.two_mass_servo import TwoMassServo, multisine, schroeder
 
 PAGE = Path(__file__).parents[1] / "docs" / "explanation" / "scipy.md"
 BEGIN, END = "<!-- begin: python -m studies.arrays --write -->", "<!-- end -->"
 SECONDS, NOISE_RAD_PER_S = 18, 0.1
 C_95 = np.sqrt(-np.log(0.05))
+SERVO = TwoMassServo(gain=0.4, integral_time_s=0.15)
+PERIOD, LINES_HZ = 4000, np.arange(4, 201, 3)  # bins of the period
 RESONANCE, ANTIRESONANCE = LINES_HZ.tolist().index(76), LINES_HZ.tolist().index(43)
-fs = RATE_HZ
+fs = SERVO.rate_hz
 
 Answer = tuple[NDArray[Any], NDArray[Any], NDArray[Any] | None]
 """Frequencies in Hz, values, and radii that cover the truth with 95 % probability; None without."""
@@ -113,8 +115,24 @@ class Score:
     covered: float | None
 
 
+@dataclass(frozen=True)
+class Signals:
+    """Excitation (samples,), torque and speed (seeds, samples)."""
+
+    w: NDArray[np.float64]
+    u: NDArray[np.float64]
+    y: NDArray[np.float64]
+
+
+def recordings(seconds: float, seeds: int, run_in: int = 2 * PERIOD) -> Signals:
+    """Recordings that differ in the noise of the speed alone, after `run_in` samples."""
+    w = np.resize(0.02 * multisine(LINES_HZ, PERIOD, schroeder(len(LINES_HZ))), round(seconds * fs))
+    u, y, _ = SERVO.run(w, NOISE_RAD_PER_S * np.random.default_rng(1).standard_normal((w.size, seeds)))
+    return Signals(w[run_in:], np.ascontiguousarray(u[run_in:].T), np.ascontiguousarray(y[run_in:].T))
+
+
 def score(method: Callable[..., Answer], signals: Signals) -> Score:
-    truth, names = plant(LINES_HZ), inspect.signature(method).parameters
+    truth, names = SERVO.response(LINES_HZ), inspect.signature(method).parameters
     errors, covered = [], []
     for u, y in zip(signals.u, signals.y):
         arrays = {"w": signals.w, "u": u, "y": y}
@@ -162,7 +180,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=100, help="recordings")
     parser.add_argument("--write", action="store_true", help="update the table of docs/explanation/scipy.md")
     options = parser.parse_args()
-    signals = measured(multisine(SECONDS), options.seeds, NOISE_RAD_PER_S)
+    signals = recordings(SECONDS, options.seeds)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", livebode.SignalWarning)
         text = table({name: score(method, signals) for name, method in PEERS.items()}, options.seeds)

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from bench.first_hour.senders import foreign_json, free_port, garbage
-from bench.first_hour.servo import Servo
+from bench.first_hour.servo import SERVO
 from bench.first_hour.terminal import LIVEBODE
 from livebode.dashboard import Dashboard, ServerSettings
 
@@ -23,7 +23,6 @@ CLICK_S = 1.5
 """To find a button and to click it."""
 DIALOG_S = 6.0
 """To choose a file in the dialog of the system, or to write an address."""
-TRUTH = Servo()
 
 
 class Person:
@@ -110,7 +109,7 @@ def resonance(person: Person, recording: str) -> str:
     """The headline of the run, whose number is the true one."""
     text = measured(person, recording)
     value, bound = map(float, re.findall(r"Resonance ([\d.]+) ± ([\d.]+) Hz", text)[0])
-    assert abs(value - TRUTH.resonance_hz) < 2 * bound, text
+    assert abs(value - SERVO.resonance_hz) < 2 * bound, text
     return text
 
 

@@ -6,15 +6,15 @@ import json
 import shutil
 import socket
 import subprocess
-import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 
-from bench.first_hour.servo import RATE_HZ, Servo
+from bench.first_hour.servo import SERVO, recorded
+from tools.sending import sending
 
 GARBAGE = b"temp=21.4;rpm=1500\r\n"
 SAMPLES = 40  # of a message
@@ -38,26 +38,6 @@ def free_port() -> int:
 
 
 @contextmanager
-def sending(send: Callable[[int], object], period_s: float) -> Iterator[None]:
-    """Call `send` with 0, 1, … in another thread, once in each period."""
-    ended = threading.Event()
-
-    def work() -> None:
-        begun, number = time.monotonic(), 0
-        while not ended.wait(max(0.0, begun + number * period_s - time.monotonic())):
-            send(number)
-            number += 1
-
-    thread = threading.Thread(target=work)
-    thread.start()
-    try:
-        yield
-    finally:
-        ended.set()
-        thread.join()
-
-
-@contextmanager
 def garbage(port: int) -> Iterator[None]:
     """Datagrams of another program, 50 per second."""
     with (
@@ -76,7 +56,7 @@ def foreign_json(folder: Path) -> Iterator[str]:
     assert program, "mosquitto is not installed: make system-packages"
     port, settings = free_port(), folder / "mosquitto.conf"
     settings.write_text(f"listener {port} 127.0.0.1\nallow_anonymous true\n")
-    recording = Servo().record()
+    recording = recorded()
     rows = {name: recording[name] for name in ("excitation", "torque", "speed")}
     count = rows["torque"].size
 
@@ -91,7 +71,7 @@ def foreign_json(folder: Path) -> Iterator[str]:
         try:
             _connected(link, port)
             link.loop_start()
-            with sending(lambda number: link.publish("hall/press3", message(number)), SAMPLES / RATE_HZ):
+            with sending(lambda number: link.publish("hall/press3", message(number)), SAMPLES / SERVO.rate_hz):
                 yield f"mqtt://127.0.0.1:{port}/hall/press3"
         finally:
             link.disconnect()

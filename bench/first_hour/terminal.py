@@ -13,10 +13,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from bench.first_hour.senders import CONFIGURATION, foreign_json, free_port, garbage
-from bench.first_hour.servo import Servo
+from bench.first_hour.servo import SERVO
 
 LIVEBODE = Path(sys.executable).with_name("livebode")
-TRUTH = Servo()
 
 
 @dataclass
@@ -60,14 +59,14 @@ def measured(terminal: Terminal, recording: str) -> str:
     stem = Path(recording).stem
     terminal.run(f"inspect {recording} --out {stem}.toml --yes")
     terminal.run(f"run {stem}.toml")
-    return near(terminal, "resonance", TRUTH.resonance_hz, f"runs/{stem}")
+    return near(terminal, "resonance", SERVO.resonance_hz, f"runs/{stem}")
 
 
 def stiffness(terminal: Terminal, recording: str) -> str:
     stem = Path(recording).stem
     terminal.run(f"inspect {recording} --out {stem}.toml --yes")
     terminal.run(f"run {stem}.toml")
-    return near(terminal, "Keff", TRUTH.stiffness, f"runs/{stem}", "--model", "two-mass")
+    return near(terminal, "Keff", SERVO.stiffness, f"runs/{stem}", "--model", "two-mass")
 
 
 def worse_at_standstill(terminal: Terminal) -> str:
@@ -129,7 +128,7 @@ def foreign_messages(terminal: Terminal) -> str:
     with foreign_json(terminal.directory) as url:
         terminal.run(f"inspect {url} --out press.toml --yes")
         terminal.run("run press.toml", end_after_s=12.0)
-    return near(terminal, "resonance", TRUTH.resonance_hz, "runs/press")
+    return near(terminal, "resonance", SERVO.resonance_hz, "runs/press")
 
 
 def line_about(text: str, expected: str) -> str:

@@ -28,11 +28,8 @@ from tests.support.command import write_parquet
 from tests.support.drive_exports import (
     COUNTS,
     EXPORTS,
-    LOAD,
-    MOTOR,
-    RATE_HZ,
-    RESONANCE_HZ,
     RPM,
+    SERVO,
     TRUTH,
     Export,
     T,
@@ -132,16 +129,16 @@ def test_any_recognised_units_give_the_same_parameters(
     folder, of = tmp_path_factory.mktemp("units"), servo()
     columns = {"w": of["w"], f"u [{torque}]": TORQUES[torque] * of["u"], f"y [{speed}]": SPEEDS[speed] * of["y"]}
     path = write_parquet(folder / "log.parquet", columns)
-    found = values(fitted(folder / "run", path, ("w", "u", "y"), {"rate_hz": RATE_HZ}))
+    found = values(fitted(folder / "run", path, ("w", "u", "y"), {"rate_hz": SERVO.rate_hz}))
     assert found == pytest.approx(in_si, rel=1e-6)
 
 
 @pytest.mark.parametrize(
     ("name", "gain", "unit"),
     [
-        ("% of the rated torque", 0.024 / (MOTOR + LOAD), "rad/s²/%"),
-        ("torque constant", 0.35 / (MOTOR + LOAD), "rad/s²/A"),
-        ("without units", 1e-3 / (MOTOR + LOAD), "output units/s per input unit"),
+        ("% of the rated torque", 0.024 / (SERVO.motor + SERVO.load), "rad/s²/%"),
+        ("torque constant", 0.35 / (SERVO.motor + SERVO.load), "rad/s²/A"),
+        ("without units", 1e-3 / (SERVO.motor + SERVO.load), "output units/s per input unit"),
     ],
 )
 def test_a_gain_that_is_not_known_has_its_own_unit_and_the_remedy_that_is_named_works(
@@ -155,7 +152,7 @@ def test_a_gain_that_is_not_known_has_its_own_unit_and_the_remedy_that_is_named_
     (_, value, _, shown), *others = found.rows()
     assert shown == unit
     assert value == pytest.approx(gain, rel=2e-3)
-    assert {row[0]: row[1] for row in others}["resonance"] == pytest.approx(RESONANCE_HZ, rel=1e-3)
+    assert {row[0]: row[1] for row in others}["resonance"] == pytest.approx(SERVO.resonance_hz, rel=1e-3)
     (remark,) = (one for one in REMARKS if "the gain is unknown" in one)
     remedy = tomllib.loads(remark.partition("as in ")[2])
     assert export.names[1] in remedy["units"]
@@ -225,7 +222,9 @@ def test_a_live_source_is_converted_as_a_recording_is(tmp_path: Path) -> None:
     channels = tuple(Channel(c.name, c.source_unit) for c in open_log(path).channels[1:])
     raw = np.concatenate([block.data for block in open_log(path).as_written().blocks(names)], axis=1)
     (tmp_path / "lines").write_bytes(
-        b"".join(encode_line(Batch(at, raw[:, at : at + 500], channels, RATE_HZ)) for at in range(0, raw.shape[1], 500))
+        b"".join(
+            encode_line(Batch(at, raw[:, at : at + 500], channels, SERVO.rate_hz)) for at in range(0, raw.shape[1], 500)
+        )
     )
     with (tmp_path / "lines").open("rb") as lines, mock.patch.object(sys, "stdin", lines):
         np.testing.assert_allclose(read(SourceSettings(url="stdin:", units=units)), expected, rtol=1e-9, atol=1e-12)

@@ -15,7 +15,7 @@ from scipy.stats import binom
 import livebode
 from livebode.core import Response
 from studies import arrays
-from studies.servo import LINES_HZ, PERIOD, RATE_HZ, Signals, measured, multisine, plant
+from studies.arrays import LINES_HZ, PERIOD, SERVO, Signals
 
 SEEDS = 100
 # The test for a drift has a false alarm in one of 100 recordings.
@@ -24,17 +24,17 @@ pytestmark = pytest.mark.filterwarnings("ignore:frf. the response drifts:livebod
 
 @cache
 def recordings() -> Signals:
-    return measured(multisine(9.0), SEEDS, arrays.NOISE_RAD_PER_S)
+    return arrays.recordings(9.0, SEEDS)
 
 
 @cache
 def responses() -> list[Response]:
     signals = recordings()
-    return [livebode.frf(signals.w, u, y, fs=RATE_HZ) for u, y in zip(signals.u, signals.y)]
+    return [livebode.frf(signals.w, u, y, fs=SERVO.rate_hz) for u, y in zip(signals.u, signals.y)]
 
 
 def test_the_bound_of_one_response_over_all_periods_covers_as_often_as_it_says() -> None:
-    truth = plant(LINES_HZ)
+    truth = SERVO.response(LINES_HZ)
     hits = sum(int(np.sum(np.abs(r.value - truth) <= r.bound())) for r in responses())
     draws = SEEDS * len(LINES_HZ)
     low, high = binom.interval(0.999, draws, 0.95)
@@ -51,7 +51,7 @@ def test_the_lines_and_the_period_are_those_of_the_excitation() -> None:
 
 def test_where_spectra_by_scipy_are_biased_by_feedback_the_mean_over_recordings_is_not() -> None:
     """At 43 Hz the plant is 29 dB below its mean, and H1 turns towards -1/F, the inverse of the controller."""
-    signals, truth = recordings(), plant(LINES_HZ)
+    signals, truth = recordings(), SERVO.response(LINES_HZ)
     line = int(np.argmin(np.abs(truth)))
 
     def mean_error(values: list[complex]) -> tuple[float, float]:
@@ -72,7 +72,7 @@ def test_where_spectra_by_scipy_are_biased_by_feedback_the_mean_over_recordings_
 def test_the_error_at_the_resonance_is_no_larger_than_that_of_scipy(
     method: Callable[..., object], times: float
 ) -> None:
-    truth = plant(LINES_HZ)[arrays.RESONANCE]
+    truth = SERVO.response(LINES_HZ)[arrays.RESONANCE]
     own = np.sqrt(np.mean([abs(r.value[arrays.RESONANCE] / truth - 1) ** 2 for r in responses()]))
     assert arrays.score(method, recordings()).error_at_resonance > times * own
 
@@ -82,7 +82,7 @@ def test_python_control_draws_and_closes_a_loop_around_a_measured_response() -> 
 
     response = responses()[0]
     closed = control.feedback(response.to_frd() * 0.4)
-    truth = 0.4 * plant(LINES_HZ) / (1 + 0.4 * plant(LINES_HZ))
+    truth = 0.4 * SERVO.response(LINES_HZ) / (1 + 0.4 * SERVO.response(LINES_HZ))
     assert np.abs(closed.frdata[0, 0] / truth - 1).max() < 1.0
     assert np.median(np.abs(closed.frdata[0, 0] / truth - 1)) < 0.1
 

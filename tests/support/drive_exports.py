@@ -10,40 +10,22 @@ from math import pi
 from pathlib import Path
 
 import numpy as np
-from scipy.linalg import expm
 
 from livebode.arrays import Floats
+from tools.two_mass_servo import TwoMassServo, multisine
 
-MOTOR, LOAD, STIFFNESS, RATE_HZ, WINDOW, PERIODS = 0.0012, 0.0025, 180.0, 4000.0, 2000, 5
-RESONANCE_HZ = np.sqrt(STIFFNESS * (1 / MOTOR + 1 / LOAD)) / (2 * pi)
-TRUTH = {"Js": MOTOR, "JL": LOAD, "Keff": STIFFNESS, "resonance": RESONANCE_HZ}
+SERVO, WINDOW, PERIODS = TwoMassServo(damping_ratio=0.018, integral_time_s=0.15), 2000, 5
+TRUTH = {"Js": SERVO.motor, "JL": SERVO.load, "Keff": SERVO.stiffness, "resonance": SERVO.resonance_hz}
 RPM, PERCENT, AMPERE, COUNTS = 30 / pi, 100 / 2.4, 1 / 0.35, (1 << 20) / (2 * pi)
 
 
 @cache
 def servo() -> dict[str, Floats]:
     """Excitation, torque, speed and angle of two masses in a speed loop, exact for a held torque, in SI units."""
-    damping = 2 * 0.018 * RESONANCE_HZ * 2 * pi / (1 / MOTOR + 1 / LOAD)
-    a = np.array(
-        [
-            [-damping / MOTOR, damping / MOTOR, -STIFFNESS / MOTOR, 0],
-            [damping / LOAD, -damping / LOAD, STIFFNESS / LOAD, 0],
-            [1, -1, 0, 0],
-            [1, 0, 0, 0],
-        ]
-    )
-    whole = expm(np.block([[a, np.array([[1 / MOTOR], [0], [0], [0]])], [np.zeros((1, 5))]]) / RATE_HZ)
-    bins, n = np.arange(2, 100, 3), np.arange(WINDOW)
-    period = 0.02 * np.cos(2 * pi * np.outer(bins, n) / WINDOW - pi * (bins**2 / bins.size)[:, np.newaxis]).sum(axis=0)
-    w = np.tile(period, PERIODS)
-    noise = 1e-3 * np.random.default_rng(1).standard_normal(w.size)
-    u, y, angle, x, integral = np.zeros(w.size), np.zeros(w.size), np.zeros(w.size), np.zeros(4), 0.0
-    for i in range(w.size):
-        y[i], angle[i] = x[0] + noise[i], x[3]
-        integral -= y[i] / RATE_HZ
-        u[i] = 0.08 * (integral / 0.15 - y[i]) + w[i]
-        x = whole[:4, :4] @ x + whole[:4, 4] * u[i]
-    return {"t": np.arange(w.size) / RATE_HZ, "w": w, "u": u, "y": y, "angle": angle}
+    bins = np.arange(2, 100, 3)
+    w = np.tile(0.02 * multisine(bins, WINDOW, -pi * bins**2 / bins.size), PERIODS)
+    u, y, angle = SERVO.run(w, 1e-3 * np.random.default_rng(1).standard_normal(w.size))
+    return {"t": np.arange(w.size) / SERVO.rate_hz, "w": w, "u": u, "y": y, "angle": angle}
 
 
 @dataclass(frozen=True)

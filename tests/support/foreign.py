@@ -6,12 +6,12 @@ import contextlib
 import json
 import socket
 import threading
-import time
 from collections.abc import Callable, Iterator
 
 import numpy as np
 
 from tests.support.command import signals
+from tools import sending as steadily
 
 SAMPLES = 10
 PERIOD_S = SAMPLES / 1000.0
@@ -19,7 +19,7 @@ FIELDS = {"torque_inject": "drive.torque.inject", "torque_actual": "drive.torque
 
 
 def messages(start: int = 0) -> Iterator[bytes]:
-    """Ten samples of the machine of `signals` in each message, for ever."""
+    """Ten samples of the machine of `signals` in each message."""
     rows = {name: np.resize(row[: len(row) // 20 * 20], 100_000) for name, row in signals().items()}
     for first in range(start, 100_000, SAMPLES):
         w, u, y = (rows[name][first : first + SAMPLES].tolist() for name in "wuy")
@@ -29,26 +29,15 @@ def messages(start: int = 0) -> Iterator[bytes]:
         }).encode()  # fmt: skip
 
 
-@contextlib.contextmanager
-def sending(send: Callable[[bytes], object], payloads: Iterator[bytes]) -> Iterator[None]:
+def sending(send: Callable[[bytes], object], payloads: Iterator[bytes]) -> contextlib.AbstractContextManager[None]:
     """Send a message every ten milliseconds."""
-    ended = threading.Event()
 
-    def work() -> None:
-        began = time.monotonic()
-        for number, payload in enumerate(payloads):
-            if ended.wait(max(0.0, began + number * PERIOD_S - time.monotonic())):
-                return
+    def next_one(_: int) -> None:
+        if (payload := next(payloads, None)) is not None:
             with contextlib.suppress(OSError):
                 send(payload)
 
-    thread = threading.Thread(target=work, daemon=True)
-    thread.start()
-    try:
-        yield
-    finally:
-        ended.set()
-        thread.join()
+    return steadily.sending(next_one, PERIOD_S)
 
 
 @contextlib.contextmanager

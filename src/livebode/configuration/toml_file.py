@@ -87,7 +87,7 @@ def meant_line(line: str) -> str | None:
     """
     from livebode.configuration.toml_mistakes import meant_lines  # needed for a mistake only
 
-    if len(line) > _TEXT_MAX:  # nobody wrote it by hand, and the patterns take the square of its length
+    if len(line) > _TEXT_MAX:  # too long to be written by hand; the patterns take the square of its length
         return None
     return next((meant for meant in meant_lines(line) if meant != line and _is_toml(meant)), None)
 

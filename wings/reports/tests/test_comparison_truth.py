@@ -20,7 +20,7 @@ from tests.support import command
 from tests.support.browser import chromium
 from tests.support.command import livebode
 from tests.support.reports import LINES, measured, plant, strokes, write_run
-from tools.two_mass_servo import Servo, write_servo
+from tests.support.servo_csv import write_servo
 
 _SETTINGS = Settings(lines=command.LINES, output="y", input="u", excitation="w", hop=20)
 
@@ -167,7 +167,7 @@ def _first_lines(of: Responses, n: int) -> Responses:
 def test_no_table_of_precise_parameters_is_wider_than_its_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Bounds of 1e-7 and a change of nothing: many digits in each column."""
     monkeypatch.chdir(tmp_path)
-    write_servo(tmp_path / "servo.csv", Servo(noise=1e-5))
+    write_servo(tmp_path / "servo.csv", noise=1e-5)
     assert livebode("inspect", "servo.csv", "--out", "servo.toml", "--yes").code == 0
     for run in ("before", "after"):
         assert livebode("run", "servo.toml", "--out", run).code == 0

@@ -22,7 +22,7 @@ from tests.support.reports import LINES, measured, plant, strokes, write_run
 from tests.support.servo import Servo, write_axis
 
 BEFORE = Servo()
-AFTER = Servo(stiffness=BEFORE.stiffness * 11 / 12, damping=BEFORE.damping)
+AFTER = Servo(stiffness=BEFORE.stiffness * 11 / 12)
 MADE = datetime(2026, 11, 21, 12, tzinfo=UTC)
 MOVING_FIT = {"model": "two-mass", "output": "velocity", "radius_m": 0.019}
 LIMITS = """
@@ -59,7 +59,7 @@ def test_a_perfect_measurement_is_headed_by_its_results(runs: tuple[Path, Path],
     assert livebode("report", runs[0], "--out", tmp_path / "r").code == 0
     text = first_page(tmp_path / "r")
     for words, true in (
-        ("resonance", BEFORE.resonance_hz), ("resonance damping ratio", 100 * BEFORE.damping),
+        ("resonance", BEFORE.resonance_hz), ("resonance damping ratio", 100 * BEFORE.damping_ratio),
         ("belt stiffness", BEFORE.stiffness), ("antiresonance", BEFORE.antiresonance_hz),
     ):  # fmt: skip
         value, bound = bounded(text, words)

@@ -25,8 +25,8 @@ from tests.support.guarded import TOKEN, VIEWER
 from tests.support.many_runs import ask
 from tests.support.peers.broker import Mosquitto, publisher, stop
 from tests.support.peers.peer import free_port
+from tests.support.servo_csv import SERVO, WINDOW, recording
 from tests.support.start_pages import CHANNELS, start_page
-from tools.two_mass_servo import RATE_HZ, WINDOW, Servo
 
 PHONE = {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobile": True}
 UNITS = {"torque_offset": "N m", "torque": "N m", "motor_speed": "rad/s"}
@@ -36,21 +36,21 @@ BATCH = 100
 @contextlib.contextmanager
 def servo(port: int, batch: int = BATCH) -> Iterator[None]:
     """The servo of two masses sends its samples by UDP, in its own rate, as long as the test lasts."""
-    columns = Servo(periods=24).recording()
+    columns = recording(24)
     data = np.array([columns[name] for name in UNITS])[:, 8 * WINDOW :]  # steady: the next repetition follows smoothly
     channels = tuple(Channel(name, unit) for name, unit in UNITS.items())
-    layout, ended = encode_layout(channels, RATE_HZ), threading.Event()
+    layout, ended = encode_layout(channels, SERVO.rate_hz), threading.Event()
 
     def datagrams() -> Iterator[bytes]:
         for first in range(0, 1 << 30, batch):
             part = data[:, np.arange(first, first + batch) % data.shape[1]]
             yield layout
-            yield encode_samples(Batch(first, part, channels, RATE_HZ, 7), double=True)
+            yield encode_samples(Batch(first, part, channels, SERVO.rate_hz, 7), double=True)
 
     def send(link: object) -> None:
         began = time.monotonic()
         for number, datagram in enumerate(datagrams()):
-            if ended.wait(max(0.0, began + number // 2 * batch / RATE_HZ - time.monotonic())):
+            if ended.wait(max(0.0, began + number // 2 * batch / SERVO.rate_hz - time.monotonic())):
                 return
             with contextlib.suppress(OSError):  # nobody listens now
                 link.sendto(datagram, ("127.0.0.1", port))  # type: ignore[attr-defined]
@@ -97,7 +97,7 @@ def test_from_the_address_of_a_servo_to_its_bode_plot(tmp_path: Path, options: d
         assert [row.split("\t")[:2] for row in heard] == [list(channel) for channel in UNITS.items()]
         assert not tab.page.is_visible("#span")
         text = tomllib.loads(tab.page.text_content("#text") or "")
-        assert text["source"] == {"url": f"udp://127.0.0.1:{port}", "rate_hz": RATE_HZ}
+        assert text["source"] == {"url": f"udp://127.0.0.1:{port}", "rate_hz": SERVO.rate_hz}
         assert text["lines"]["window"] == 1000
         measured(tab)
         assert tab.page.evaluate("() => document.documentElement.scrollWidth <= innerWidth")
@@ -109,7 +109,7 @@ def test_from_the_address_of_a_servo_to_its_bode_plot(tmp_path: Path, options: d
     summary = json.loads((folder / name / "run.json").read_text())
     assert summary["record"]["ended"] or summary["record"]["finished"]
     response = RunRecord.open(folder / name).responses()[-1:]
-    truth = Servo().response(response.frequency_hz)
+    truth = SERVO.response(response.frequency_hz)
     assert np.all(np.abs(response.value[0] - truth) < 0.05 * np.abs(truth))
 
 

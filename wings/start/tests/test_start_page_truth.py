@@ -15,8 +15,8 @@ from livebode.records import RunRecord
 from livebode_start.workspace import Workspace
 from tests.support.browser import Tab, chromium
 from tests.support.command import livebode
+from tests.support.servo_csv import SERVO, write_servo
 from tests.support.start_pages import CHANNELS, drop, start_page
-from tools.two_mass_servo import LOAD, MOTOR, STIFFNESS, Servo, write_servo
 
 PHONE = {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobile": True}
 
@@ -28,7 +28,7 @@ def newest(run: Path) -> Responses:
 def check_truth(run: Path) -> None:
     """Value and bounds at each line are those of the machine."""
     response = newest(run)
-    truth = Servo().response(response.frequency_hz)
+    truth = SERVO.response(response.frequency_hz)
     error = np.abs(response.value[0] - truth)
     assert np.all(error < 0.05 * np.abs(truth))
     assert np.mean(error < 3 * response.sigma[0]) > 0.9
@@ -66,7 +66,7 @@ def test_the_largest_text_of_a_measured_servo_is_its_resonance_in_the_language_o
         headline = tab.page.inner_text("#headline")
         assert tab.wrong == []
     value, bound = (float(n.replace(",", ".")) for n in re.findall(r"[\d,]+", headline)[:2])
-    truth_hz = np.sqrt(STIFFNESS * (1 / MOTOR + 1 / LOAD)) / (2 * np.pi)
+    truth_hz = SERVO.resonance_hz
     assert abs(value - truth_hz) < 2 * bound < 0.5
 
 
@@ -162,7 +162,7 @@ def test_a_recording_beside_the_directory_is_chosen_and_the_terminal_repeats_it(
     monkeypatch.chdir(tmp_path)
     write_servo(tmp_path / "servo.csv")
     for number in range(8):
-        write_servo(tmp_path / f"short {number}.csv", Servo(periods=1))
+        write_servo(tmp_path / f"short {number}.csv", periods=1)
         os.utime(tmp_path / f"short {number}.csv", (2e9, 2e9))
     (tmp_path / "notes.toml").write_text("")
     (tmp_path / "link.csv").symlink_to("servo.csv")
@@ -198,7 +198,7 @@ def test_only_beside_a_directory_in_the_working_one_recordings_are_offered(
 def test_a_measurement_is_followed_and_can_be_cancelled_after_a_reload_in_the_middle(tmp_path: Path) -> None:
     folder = tmp_path / "runs"
     with start_page(folder) as url, chromium() as browser, Tab(browser, url, wait=False) as tab:
-        drop(tab, write_servo(tmp_path / "servo.csv", Servo(periods=400)))
+        drop(tab, write_servo(tmp_path / "servo.csv", periods=400))
         tab.page.click("#measure")
         tab.page.wait_for_selector(".job button")
         tab.page.reload()

@@ -28,8 +28,8 @@ from tests.support.errors import refused
 from tests.support.guarded import TOKEN, VIEWER
 from tests.support.many_runs import ask
 from tests.support.peers.peer import PATIENCE_S
+from tests.support.servo_csv import write_servo
 from tests.support.start_pages import send, start_page
-from tools.two_mass_servo import Servo, write_servo
 
 LOCKED = ServerSettings("127.0.0.1", 0, token=TOKEN, viewer_token=VIEWER)
 
@@ -163,7 +163,7 @@ def test_a_second_recording_of_the_same_name_replaces_nothing(tmp_path: Path) ->
 def test_an_upload_may_last_as_long_as_its_parts_come(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The listener gives any other request its whole time for everything."""
     monkeypatch.setattr(listener, "REQUEST_S", 1.0)
-    data = write_servo(tmp_path / "servo.csv", Servo(periods=4)).read_bytes()
+    data = write_servo(tmp_path / "servo.csv", periods=4).read_bytes()
     with start_page(tmp_path / "runs") as url:
         parts = urlsplit(url)
         head = f"POST /api/upload?name=servo.csv HTTP/1.1\r\nHost: {parts.netloc}\r\nOrigin: {url.rstrip('/')}\r\n"

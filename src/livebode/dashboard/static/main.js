@@ -323,7 +323,7 @@ function begin({ facts, axes, trends }) {
   if (facts.watched !== page.quantity) watchShown();
 }
 
-/** Those that this run has; why the others are absent is said on request. @param {Run} facts */
+/** Those that this run has; a button gives the reason why the others are absent. @param {Run} facts */
 function showQuantities({ quantities }) {
   const [known, absent] = [quantities.filter((q) => !q.why_not), quantities.filter((q) => q.why_not)];
   segments(
