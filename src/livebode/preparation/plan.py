@@ -8,11 +8,11 @@ from typing import Protocol
 import numpy as np
 
 from livebode.configuration import Axis
-from livebode.core import ANY_EXCITATION, Block, ConfigError, Event, Lines, LivebodeError
+from livebode.core import ANY_EXCITATION, Block, ConfigError, Event, Lines
 from livebode.estimation import FORGETTING, RippleOrder, Settings, default_hop, divisors
 from livebode.language import Message
 from livebode.preparation.checks import check_length
-from livebode.preparation.roles import ROLES, check_distinct, check_roles
+from livebode.preparation.roles import ROLES, check_distinct, check_roles, period_of
 from livebode.sources import Log
 
 _LAGS = 8  # samples around the window in which another period is searched
@@ -40,12 +40,8 @@ def window_doubt(samples: np.ndarray, settings: Settings) -> list[Event]:
 
 def divided_window(samples: np.ndarray, settings: Settings) -> list[Event]:
     """An event if a whole number of the excitation's periods, as `recognise` finds it, is not the window."""
-    from livebode.excitation import recognise  # its statistics are slow to import
-
-    window = settings.lines.window
-    try:
-        period = recognise(samples, settings.lines.rate_hz, doubtful=True).period
-    except LivebodeError:  # the person knows better
+    window, period = settings.lines.window, period_of(samples, settings.lines.rate_hz)
+    if period is None:  # the person knows better
         return []
     longest = max(window, period)
     if window % period == 0 or samples.size <= longest:

@@ -167,7 +167,7 @@ def _not_repeating(spectra: RoleSpectra, signal: Floats | None) -> Suspicion | N
     if settings.method.reference != "excitation" or spectra.repeating >= _REPEATING_USUAL:
         return None
     remedy = Message("name the channel of the signal that is added; {spectrum}", spectrum=ANY_EXCITATION)
-    period = None if signal is None else _period(signal, settings.lines.rate_hz)
+    period = None if signal is None else period_of(signal, settings.lines.rate_hz)
     if period is not None and settings.lines.window % period:
         remedy = Message(
             "it repeats every {period} samples: choose a multiple of them as window (lines.window, option --window)",
@@ -187,7 +187,7 @@ def _not_repeating(spectra: RoleSpectra, signal: Floats | None) -> Suspicion | N
     )
 
 
-def _period(signal: Floats, rate_hz: float) -> int | None:
+def period_of(signal: Floats, rate_hz: float) -> int | None:
     """The period with which a signal repeats, in samples; None if it does not."""
     from livebode.excitation import recognise  # its statistics are slow to import
 

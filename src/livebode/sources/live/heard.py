@@ -8,7 +8,7 @@ from collections import deque
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from threading import Timer
-from typing import TYPE_CHECKING, Any, Protocol, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -97,12 +97,6 @@ class Survey:
         columns = [Column(c.name, c.unit, samples, key=row) for c, row in zip(channels, self.block.data)]
         log = log_of(ArrayRecording(Url(self.source["url"]), columns), rate_hz=rate_hz, time="none")
         return log, {**self.source, "rate_hz": rate_hz}
-
-
-class SurveyFunction(Protocol):
-    """Listens to the address of these settings for some seconds."""
-
-    def __call__(self, settings: SourceKeys, seconds: float) -> Survey: ...
 
 
 def survey(url: str, seconds: float = LISTEN_S) -> Survey:
