@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import os
 import resource
 import socket
 import subprocess
@@ -35,7 +36,9 @@ LOCKED = ServerSettings("127.0.0.1", 0, token=TOKEN, viewer_token=VIEWER)
 
 
 def contents(folder: Path) -> list[str]:
-    return sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*"))
+    """`os.walk` passes over a folder that the server removes meanwhile; `Path.rglob` raises."""
+    paths = [Path(parent, name) for parent, folders, files in os.walk(folder) for name in folders + files]
+    return sorted(path.relative_to(folder).as_posix() for path in paths)
 
 
 def body(sender: socket.socket) -> bytes:
