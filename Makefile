@@ -4,6 +4,7 @@ VENV   ?= .venv
 BIN     = $(VENV)/bin
 BUILT   = $(VENV)/.built
 NODE    = node_modules/.package-lock.json
+BUNDLE  = src/livebode/dashboard/_bundle/manifest.json
 # Small products only make BLAS's threads wait for each other; the command line does the same for itself.
 export OPENBLAS_NUM_THREADS ?= 1
 # One more than there are processors: a test that waits, for a server or a child, leaves them to others.
@@ -13,10 +14,11 @@ BY_FILE = -n $(WORKERS) --dist loadfile --no-loadscope-reorder
 WHEELS  = .venv-wheels
 # A Python that has the wheel of the stable ABI: the newest of pyenv, else that of the system.
 LATER_PYTHON ?= $(or $(lastword $(sort $(wildcard $(HOME)/.pyenv/versions/3.1[2-9].*/bin/python3))),python3.13)
+PAGES   = $(shell find src wings -type f -path '*/static/*' -o -type f -path '*/_vendor/*')
 NATIVE  = $(shell find kernel native simulation CMakeLists.txt src/livebode/kernel src/livebode/simulation -name '*.[ch]' -o -name '*.cpp' -o -name CMakeLists.txt -o -name '*.cmake')
 C_SOURCES = $(shell find kernel native simulation src examples bench tests -name '*.[ch]' -o -name '*.cpp')
 
-.PHONY: help demo test test-changed durations mutations size pytest docs lint bench bench-compare release-check wheels test-abi3 bench-abi3 profiles lowest publishing outage peers studies repeating recognition uneven nonperiodic fit-bounds common-modes monitoring healthy temperature trends fuzz crash damage deletions archive-faults fleet-faults fleet-scale soak attacks screenshots system-packages catalogues lock clean
+.PHONY: help bundle demo test test-changed durations mutations size pytest docs lint bench bench-compare release-check wheels test-abi3 bench-abi3 profiles lowest publishing outage peers studies repeating recognition uneven nonperiodic fit-bounds common-modes monitoring healthy temperature trends fuzz crash damage deletions archive-faults fleet-faults fleet-scale soak attacks screenshots system-packages catalogues lock clean
 
 help:            ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 20
@@ -34,13 +36,19 @@ $(BUILT): $(VENV)/.installed pyproject.toml $(NATIVE)
 # Node.js is from PyPI; the lock file has the hashes of the packages.
 $(NODE): $(VENV)/.installed package.json package-lock.json
 	PATH="$(abspath $(BIN)):$$PATH" npm ci --ignore-scripts --no-audit --no-fund --loglevel=error \
-		|| { echo "npm could not install TypeScript and Biome: see Set up in CONTRIBUTING.md"; exit 1; }
+		|| { echo "npm could not install TypeScript, Biome and esbuild: see Set up in CONTRIBUTING.md"; exit 1; }
 	touch $@
+
+bundle: $(BUILT) $(NODE)  ## join the scripts and styles of each page; without, or where they differ, pages load them one by one
+	@$(BIN)/python -m tools.bundle
+
+$(BUNDLE): $(BUILT) $(NODE) $(PAGES) tools/bundle.py src/livebode/dashboard/plugin_pages.py
+	@$(MAKE) --no-print-directory bundle
 
 demo: $(BUILT)   ## track a simulated machine, live
 	$(BIN)/livebode demo
 
-test: $(BUILT) $(NODE)  ## lint, types, import contract and every test
+test: $(BUILT) $(BUNDLE)  ## lint, types, import contract and every test
 	$(MAKE) --no-print-directory --jobs=2 lint pytest  # what checks the types has one thread
 
 # Python compiles the tests once; else each of the processes below would.
@@ -48,10 +56,10 @@ $(VENV)/.compiled: $(BUILT)
 	-@$(BIN)/python -m pytest --collect-only -q >/dev/null
 	touch $@
 
-pytest: $(BUILT) $(NODE) $(VENV)/.compiled
+pytest: $(BUILT) $(BUNDLE) $(VENV)/.compiled
 	@$(BIN)/python -m pytest $(BY_FILE)
 
-durations: $(BUILT) $(NODE) $(VENV)/.compiled  ## every test, then the seconds of the longest in bench/history/test-seconds.csv
+durations: $(BUILT) $(BUNDLE) $(VENV)/.compiled  ## every test, then the seconds of the longest in bench/history/test-seconds.csv
 	@$(BIN)/python -m pytest $(BY_FILE) --junitxml=build/tests.xml -o junit_family=xunit1
 	@$(BIN)/python -m tools.test_seconds build/tests.xml > bench/history/test-seconds.csv
 
@@ -86,7 +94,7 @@ $(VENV)/.bench: $(BUILT) requirements-bench.lock
 	$(BIN)/python -m pip install --quiet --require-hashes -r requirements-bench.lock
 	touch $@
 
-bench: $(VENV)/.bench  ## side by side with what a user would pick instead
+bench: $(VENV)/.bench $(BUNDLE)  ## side by side with what a user would pick instead
 	$(BIN)/python -m bench
 	$(BIN)/python -m bench.dense_bound
 	$(BIN)/python -m bench.large_rows
@@ -106,6 +114,7 @@ bench: $(VENV)/.bench  ## side by side with what a user would pick instead
 	$(BIN)/python -m bench.segments
 	$(BIN)/python -m bench.start
 	$(BIN)/python -m bench.dashboard
+	$(BIN)/python -m bench.page
 	$(BIN)/python -m bench.readers
 	$(BIN)/python -m bench.runs
 	$(BIN)/python -m bench.archive
@@ -119,7 +128,7 @@ $(WHEELS)/.installed: requirements-wheels.lock
 	$(WHEELS)/bin/python -m pip install --quiet --require-hashes -r requirements-wheels.lock
 	touch $@
 
-wheels: $(WHEELS)/.installed  ## wheels for every Python of this computer in dist/, tried without a compiler or the network (10 min)
+wheels: $(WHEELS)/.installed $(BUNDLE)  ## wheels for every Python of this computer in dist/, tried without a compiler or the network (10 min)
 	$(WHEELS)/bin/python -m tools.wheels build
 	$(WHEELS)/bin/python -m tools.wheels gather
 	$(WHEELS)/bin/python -m tools.wheels try
@@ -132,10 +141,10 @@ bench-abi3: $(BUILT)  ## the speed of the stable ABI and of the ABI of LATER_PYT
 	@$(MAKE) --no-print-directory VENV=.venv-abi3 PYTHON=$(LATER_PYTHON) .venv-abi3/.built
 	$(BIN)/python -m bench.stable_abi .venv-abi3/bin/python
 
-release-check: $(VENV)/.docs $(WHEELS)/.installed  ## what is missing for a release (CONTRIBUTING.md)
+release-check: $(VENV)/.docs $(WHEELS)/.installed $(BUNDLE)  ## what is missing for a release (CONTRIBUTING.md)
 	$(BIN)/python -m tools.release check
 
-profiles: $(BUILT) $(WHEELS)/.installed  ## install each profile of the wheel into a fresh environment: sizes, and whether the core works (10 min)
+profiles: $(BUNDLE) $(WHEELS)/.installed  ## install each profile of the wheel into a fresh environment: sizes, and whether the core works (10 min)
 	PATH="$(abspath $(BIN)):$(abspath $(WHEELS)/bin):$$PATH" $(BIN)/python -m tools.profiles
 
 lowest: $(BUILT) $(WHEELS)/.installed  ## tests with the lowest versions that pyproject.toml permits (20 min)
@@ -243,7 +252,7 @@ lock: $(VENV)/.uv ## renew the pinned dependencies from pyproject.toml
 	$(BIN)/uv export --quiet --no-header --format requirements-txt --no-emit-project --only-group bench -o requirements-bench.lock
 	$(BIN)/uv export --quiet --no-header --format requirements-txt --no-emit-project --only-group docs -o requirements-docs.lock
 	$(BIN)/uv export --quiet --no-header --format requirements-txt --no-emit-project --only-group wheels -o requirements-wheels.lock
-	PATH="$(abspath $(BIN)):$$PATH" npm install --package-lock-only --save-dev --save-exact @biomejs/biome@latest axe-core@latest typescript@latest
+	PATH="$(abspath $(BIN)):$$PATH" npm install --package-lock-only --save-dev --save-exact @biomejs/biome@latest axe-core@latest esbuild@latest typescript@latest
 
 clean:           ## remove what was built
-	rm -rf build dist node_modules $(VENV) $(WHEELS) .venv-abi3
+	rm -rf build dist node_modules $(dir $(BUNDLE)) $(VENV) $(WHEELS) .venv-abi3

@@ -5,14 +5,14 @@ from __future__ import annotations
 import html
 import tempfile
 from collections.abc import Callable, Mapping
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, get_args
 
 from starlette.applications import Starlette
 from starlette.background import BackgroundTask
 from starlette.requests import Request
-from starlette.responses import FileResponse, HTMLResponse, JSONResponse, RedirectResponse, Response
+from starlette.responses import FileResponse, HTMLResponse, JSONResponse, PlainTextResponse, RedirectResponse, Response
 from starlette.routing import BaseRoute, Route, WebSocketRoute
 from starlette.websockets import WebSocket
 
@@ -39,6 +39,7 @@ from livebode.dashboard.runs_pages import RunsPages
 from livebode.dashboard.server_settings import ServerSettings
 from livebode.dashboard.signals import signals
 from livebode.dashboard.state import State
+from livebode.dashboard.static_files import StaticFile, contents, static_files
 from livebode.language import Message, catalogue_for_page, in_language, negotiated, tr, worded
 from livebode.plugins import loaded
 from livebode.records import SavedCurves, change_saved, read_saved
@@ -70,8 +71,8 @@ def applied(change: SavedChange, past: Past, state: State) -> Callable[[SavedCur
     return add
 
 
-_HERE = Path(__file__).parent
-_FILE_TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
+_LANGUAGE = "language"
+"""Cookie with the language that a person has chosen; the page sets it."""
 _TYPES = {"csv": "text/csv; charset=utf-8", "mat": "application/octet-stream"}
 
 
@@ -87,7 +88,8 @@ def application(
     `workspaces` are the pages of plug-ins beside the list of runs, by name.
     """
     workspaces = workspaces or {}
-    pages = _Pages(board, serving, _files(others, workspaces))
+    sources = contents(() if others is None else (others.static,)) | files_of_additions(workspaces)
+    pages = _Pages(board, serving, static_files(sources))
     routes: list[BaseRoute] = [
         Route("/login", pages.login_page, methods=["GET"]),
         Route("/login", pages.login, methods=["POST"]),
@@ -134,7 +136,7 @@ def _page_routes(pages: _Pages) -> list[BaseRoute]:
 class _Pages:
     """The handlers of the routes."""
 
-    def __init__(self, board: Board, serving: ServerSettings, files: dict[str, tuple[bytes, str]]) -> None:
+    def __init__(self, board: Board, serving: ServerSettings, files: Mapping[str, StaticFile]) -> None:
         self._board, self._secure, self._language = board, serving.tls is not None, serving.language
         self.files = files
 
@@ -162,9 +164,8 @@ class _Pages:
 
     async def catalogue(self, request: Request) -> Response:
         """The language of the page; also for the login, so without access control."""
-        asked_for = request.query_params.get("language", "")
-        code = negotiated(asked_for, self._language, request.headers.get("accept-language", ""))
-        return Response(catalogue_for_page(code), media_type="application/json", headers={"vary": "accept-language"})
+        chosen, accepted = request.cookies.get(_LANGUAGE, ""), request.headers.get("accept-language", "")
+        return _catalogue(negotiated(chosen, self._language, accepted))
 
     async def logout(self, request: Request) -> Response:
         self._board.access.logout(request.headers.get("cookie", ""))
@@ -289,8 +290,7 @@ class _Pages:
 
     def file(self, name: str) -> Response:
         """A static file."""
-        content, kind = self.files.get(name, (b"not found\n", ""))
-        return Response(content, 200 if kind else 404, media_type=kind or "text/plain")
+        return self.files.get(name) or PlainTextResponse("not found\n", 404)
 
     def _asked_state(self, request: Request) -> State | None:
         """The state of the axis of a query, if its run has started; None without access."""
@@ -306,14 +306,9 @@ class _Pages:
         return state
 
 
-def _files(others: PluginPages | None, workspaces: Mapping[str, WorkspacePages]) -> dict[str, tuple[bytes, str]]:
-    """Content and type of the static files, in memory: reading a file would take a thread for each request."""
-    folders = [(_HERE / "static", ""), (_HERE / "_vendor" / "uplot", "uplot/")]
-    if others is not None:
-        folders.append((others.static, ""))
-    files = {prefix + path.name: path.read_bytes() for folder, prefix in folders for path in folder.iterdir()}
-    files |= files_of_additions(workspaces)
-    return {name: (content, kind) for name, content in files.items() if (kind := _FILE_TYPES.get(Path(name).suffix))}
+@cache
+def _catalogue(code: str) -> StaticFile:
+    return StaticFile(catalogue_for_page(code), "application/json", vary="accept-language, cookie")
 
 
 def _as(state: State, responses: Responses, span: queries.Span) -> Responses:

@@ -1,6 +1,6 @@
 // @ts-check
 // The language of the page: sentences by their English text, and numbers. The server selects the catalogue from the
-// choice in the help, `[serve] language` or the language of the browser. For its messages see worded.js.
+// choice in the help (a cookie), `[serve] language` or the language of the browser. For its messages see worded.js.
 
 /**
  * @typedef {object} Catalogue
@@ -21,19 +21,12 @@ const ENGLISH = {
   messages: {},
   languages: { en: "English" },
 };
+const YEAR_S = 365 * 86400;
 const SHOWN = ["title", "aria-label", "placeholder"];
-
-function chosen() {
-  try {
-    return localStorage.language || "";
-  } catch {
-    return ""; // a browser that stores nothing
-  }
-}
 
 /** @returns {Promise<Catalogue>} */
 async function load() {
-  const answer = await fetch(`/catalogue?language=${encodeURIComponent(chosen())}`).catch(() => null);
+  const answer = await fetch("/catalogue").catch(() => null); // each page preloads it
   return answer?.ok ? answer.json() : ENGLISH;
 }
 
@@ -45,11 +38,8 @@ export const language = await load();
  * @param {string} code
  */
 export function choose(code) {
-  try {
-    localStorage.language = code;
-  } catch {
-    /* it is not stored */
-  }
+  // biome-ignore lint/suspicious/noDocumentCookie: the cookie store needs HTTPS.
+  document.cookie = `language=${code}; path=/; max-age=${YEAR_S}; samesite=strict`;
   location.reload();
 }
 
