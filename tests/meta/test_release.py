@@ -15,7 +15,7 @@ from tools.command_line import page as command_page
 from tools.configuration import page as configuration_page
 from tools.error_codes import page as error_page
 from tools.release.__main__ import run
-from tools.release.builds import metadata_fault, wheel_fault
+from tools.release.builds import BUNDLE, metadata_fault, wheel_fault
 from tools.release.checks import CHECKS
 from tools.release.prepare import prepare
 
@@ -163,14 +163,15 @@ LICENCES = [f"livebode-1.2.0.dist-info/licenses/{name}" for name in FILES if nam
 @pytest.mark.parametrize(
     ("names", "version", "fault"),
     [
-        (LICENCES, "1.2.0", ""),
+        ([*LICENCES, BUNDLE], "1.2.0", ""),
+        (LICENCES, "1.2.0", f"the wheel lacks {BUNDLE}"),
         ([*LICENCES, "livebode/tests/test_run.py"], "1.2.0", "the wheel contains livebode/tests/test_run.py"),
         ([*LICENCES, "livebode/kernel/native.cpp"], "1.2.0", "the wheel contains livebode/kernel/native.cpp"),
         (LICENCES[:2], "1.2.0", "the wheel lacks the licence files src/livebode/dashboard/_vendor/uplot/LICENSE"),
-        (LICENCES, "1.1.0", "the metadata has version 1.1.0"),
+        ([*LICENCES, BUNDLE], "1.1.0", "the metadata has version 1.1.0"),
     ],
 )
-def test_a_wheel_with_foreign_files_without_licences_or_of_another_version_is_a_fault(
+def test_a_wheel_with_foreign_files_without_licences_bundle_or_of_another_version_is_a_fault(
     names: list[str], version: str, fault: str, ready: Path, tmp_path: Path
 ) -> None:
     wheel = tmp_path / "livebode.whl"

@@ -98,8 +98,8 @@ class Tab:
     def reload(self) -> None:
         """Load the page again, once its address holds every choice: a page changes its address only so often."""
         self.page.evaluate(
-            "async () => { const { link } = await import('/static/address.js');"
-            " while (link() !== location.href) await new Promise((done) => setTimeout(done, 20)); }"
+            "async () => { while (livebode.shownAddress() !== location.href)"
+            " await new Promise((done) => setTimeout(done, 20)); }"
         )
         self.page.reload()
 

@@ -18,6 +18,7 @@ from tools.release.files import version
 
 WANTED = ("Name", "Version", "Summary", "License-Expression", "Requires-Python", "Description-Content-Type")
 HOOK = "import sys, scikit_build_core.build as build; build.build_{kind}(sys.argv[1])"
+BUNDLE = "livebode/dashboard/_bundle/manifest.json"
 FOREIGN = re.compile(r"(^|/)(tests?|bench|studies|conftest\.py)(/|$)|(^|/)test_[^/]*$|\.(cpp|h|po)$")
 
 
@@ -74,6 +75,8 @@ def wheel_fault(root: Path, wheel: Path) -> str:
         missing = [name for name in licence_files(root) if not any(f"/licenses/{name}" in found for found in names)]
         if missing:
             return f"the wheel lacks the licence files {', '.join(missing)}"
+        if BUNDLE not in names:
+            return f"the wheel lacks {BUNDLE}"
         metadata = next(name for name in names if name.endswith(".dist-info/METADATA"))
         return metadata_fault(archive.read(metadata).decode(), version(root))
 
@@ -87,6 +90,7 @@ def sdist_fault(root: Path, sdist: Path) -> str:
             "kernel/CMakeLists.txt",
             "native/CMakeLists.txt",
             "pyproject.toml",
+            f"src/{BUNDLE}",
             *licence_files(root),
         ]
         missing = [name for name in needed if name not in names]
@@ -110,6 +114,6 @@ def sdist(root: Path) -> str:
 BUILDS = (
     Check("catalogues", translations, "make catalogues, and translate what it lists"),
     Check("documentation", documentation, "correct what make docs reports"),
-    Check("wheel", wheel, "correct [project] and [tool.scikit-build] in pyproject.toml"),
-    Check("sdist", sdist, "correct [project] and [tool.scikit-build] in pyproject.toml"),
+    Check("wheel", wheel, "make bundle; correct [project] and [tool.scikit-build] in pyproject.toml"),
+    Check("sdist", sdist, "make bundle; correct [project] and [tool.scikit-build] in pyproject.toml"),
 )

@@ -111,8 +111,11 @@ class Trial:
             found = next((url for line in view.stdout if (url := re.search(r"http://\S+", line))), None)
             if found is None:
                 raise RuntimeError("livebode view gave no address")
-            with urllib.request.urlopen(found.group()) as page:
-                return f"{len(page.read()) / 1e3:.0f} kB page"
+            with urllib.request.urlopen(found.group()) as answer:
+                page = answer.read()
+            if b'src="/static/index-' not in page:
+                raise RuntimeError("the page is not served as a bundle")
+            return f"{len(page) / 1e3:.0f} kB page"
         finally:
             _end(view)
 

@@ -1,7 +1,7 @@
 // @ts-check
 // The page: messages from the server go to the panels, actions of the person go to the server.
 import { ADDITIONS } from "./additions.js";
-import { chosen, enter, remember } from "./address.js";
+import { chosen, enter, remember, link as shownAddress } from "./address.js";
 import { alarmMoment } from "./alarmmoment.js";
 import { Bode } from "./bode.js";
 import { onClock, setClock } from "./clock.js";
@@ -529,5 +529,5 @@ const showClock = zoneChoice($("clock", HTMLSelectElement));
 const lost = new Lost($("lost"));
 describe(page, { bode, tracking, map, trends: [parameters, marginTrends] });
 onClock(newClock);
-window.livebode = { page, ...parts, parameters, margins, marginTrends, saved, zoom, ...additions };
+window.livebode = { page, ...parts, parameters, margins, marginTrends, saved, zoom, shownAddress, ...additions };
 requestAnimationFrame(draw);
