@@ -18,7 +18,7 @@ from playwright.sync_api import Browser
 
 from livebode.dashboard import Dashboard, ServerSettings, plugin_pages, static_files
 from tests.support.browser import Tab
-from tests.support.dashboards import LINES, Watched, begin
+from tests.support.dashboards import Watched, whole_run
 from tests.support.peers.peer import PATIENCE_S
 from tools.bundle import sources
 
@@ -84,13 +84,18 @@ def test_every_file_that_a_page_loads_is_a_source_of_its_bundle() -> None:
         assert known - {"icon.svg"} == _manifest()[page]["sources"].keys() - {"icon.svg"}
 
 
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return whole_run(tmp_path_factory.mktemp("whole") / "run")
+
+
 @contextmanager
-def begun_run(browser: Browser) -> Iterator[Tab]:
-    """The page of a run that has begun, which does not change."""
+def page_of_run(browser: Browser, run: Path) -> Iterator[Tab]:
+    """The page of a finished run, which does not change."""
     dashboard = Dashboard(ServerSettings("127.0.0.1", 0))
-    begin(dashboard.hub("axis"), Path("/nowhere"), LINES)
+    dashboard.view(run)
     with dashboard, Tab(browser, dashboard.url, wait=False) as tab:
-        tab.until("bode.curves.measured && page.health")
+        tab.until("bode.curves.measured")
         tab.page.wait_for_load_state("networkidle")
         tab.settle()
         yield tab
@@ -99,12 +104,12 @@ def begun_run(browser: Browser) -> Iterator[Tab]:
 
 @pytest.mark.parametrize("part", ["whatIf", "matrix", "start"])
 def test_without_a_wing_its_page_has_the_other_files_one_by_one(
-    part: str, monkeypatch: pytest.MonkeyPatch, browser: Browser
+    part: str, monkeypatch: pytest.MonkeyPatch, browser: Browser, run: Path
 ) -> None:
     named = dict(plugin_pages.named("pages"))
     others = {name: where for name, where in named.items() if name != part}
     monkeypatch.setattr(plugin_pages, "named", lambda _: others)
-    with begun_run(browser) as tab:
+    with page_of_run(browser, run) as tab:
         assert set(tab.js("Object.keys(livebode)")) & named.keys() == others.keys()
         assert not is_bundled(tab.page.request.get(tab.url).body())
 
@@ -117,13 +122,13 @@ LOOK = """() => [...document.querySelectorAll("[id]")].map((one) => {
 
 @pytest.mark.usefixtures("files")
 def test_the_bundle_shows_the_same_page_as_its_files(
-    browser: Browser, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    browser: Browser, monkeypatch: pytest.MonkeyPatch, run: Path, tmp_path: Path
 ) -> None:
-    with begun_run(browser) as tab:
+    with page_of_run(browser, run) as tab:
         assert is_bundled(tab.page.request.get(tab.url).body())
         bundled = tab.js("Object.keys(livebode)"), tab.js("document.body.innerText"), tab.page.evaluate(LOOK)
     monkeypatch.setattr(static_files, "BUNDLE", tmp_path)
-    with begun_run(browser) as tab:
+    with page_of_run(browser, run) as tab:
         assert not is_bundled(tab.page.request.get(tab.url).body())
         parts, text, looks = tab.js("Object.keys(livebode)"), tab.js("document.body.innerText"), tab.page.evaluate(LOOK)
     assert parts == bundled[0]
