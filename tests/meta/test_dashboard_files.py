@@ -38,7 +38,7 @@ def test_scripts_of_the_page_are_type_checked_and_import_only_local_files() -> N
 def test_the_tools_of_the_page_are_pinned_by_hash_and_without_addresses() -> None:
     lock = json.loads((ROOT / "package-lock.json").read_text())
     tools = {name: facts for name, facts in lock["packages"].items() if name}
-    assert {"node_modules/typescript", "node_modules/@biomejs/biome"} <= tools.keys()
+    assert {f"node_modules/{name}" for name in ("@biomejs/biome", "esbuild", "typescript")} <= tools.keys()
     assert all(facts["integrity"].startswith("sha512-") and "resolved" not in facts for facts in tools.values())
     shown = re.search(r"uPlot ([\d.]+)", (HERE / "_vendor/uplot/README.md").read_text())
     assert shown is not None

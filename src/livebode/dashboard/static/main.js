@@ -76,6 +76,47 @@ const page = {
   measured: null,
   seeking: false,
 };
+// First, so that it connects while the panels are made; its messages come after that.
+const link = new Link({
+  onState: (up) => {
+    page.up = up;
+    if (!up) status();
+  },
+  onNews: (news) => {
+    const beginning = news.facts ? news : null;
+    // Until the facts of the axis in the address arrive, what comes belongs to another one.
+    if (beginning ? overtaken(beginning) || elsewhere(beginning) : !page.facts) return;
+    if (news.error) complain(worded(news.words ?? news.error));
+    if (news.span && setClock(news.span.clock, news.span.start_s ?? 0)) newClock();
+    if (beginning) begin(beginning);
+    if (news.span) {
+      timeline.take(news.span);
+      zoom.renew();
+      restore(news.span);
+    }
+    if (news.health && page.facts?.begun) {
+      page.health = news.health;
+      health($("health"), news.health, page.facts, timeline.span);
+      margins.lines = news.health.ms_at_lines;
+      page.dirty.add("fits");
+    }
+    if (news.verdicts) page.verdicts = news.verdicts;
+    events.nowS = timeline.span.last_s;
+    if (news.notices) events.take(news.notices, news.history, news.forgotten);
+    if (news.newest) {
+      for (const trend of news.newest) {
+        parameters.take(trend);
+        marginTrends.take(trend);
+      }
+      page.dirty.add("trends");
+    }
+    status();
+  },
+  onBytes: (data) => {
+    for (const frame of framesOf(data)) takeFrame(frame);
+  },
+});
+
 const axisChoice = $("axis", HTMLSelectElement);
 const bode = new Bode(
   [$("magnitude"), $("phase"), $("coherence")],
@@ -144,46 +185,6 @@ function complain(text) {
     $("notice").hidden = true;
   }, 8000);
 }
-
-const link = new Link({
-  onState: (up) => {
-    page.up = up;
-    if (!up) status();
-  },
-  onNews: (news) => {
-    const beginning = news.facts ? news : null;
-    // Until the facts of the axis in the address arrive, what comes belongs to another one.
-    if (beginning ? overtaken(beginning) || elsewhere(beginning) : !page.facts) return;
-    if (news.error) complain(worded(news.words ?? news.error));
-    if (news.span && setClock(news.span.clock, news.span.start_s ?? 0)) newClock();
-    if (beginning) begin(beginning);
-    if (news.span) {
-      timeline.take(news.span);
-      zoom.renew();
-      restore(news.span);
-    }
-    if (news.health && page.facts?.begun) {
-      page.health = news.health;
-      health($("health"), news.health, page.facts, timeline.span);
-      margins.lines = news.health.ms_at_lines;
-      page.dirty.add("fits");
-    }
-    if (news.verdicts) page.verdicts = news.verdicts;
-    events.nowS = timeline.span.last_s;
-    if (news.notices) events.take(news.notices, news.history, news.forgotten);
-    if (news.newest) {
-      for (const trend of news.newest) {
-        parameters.take(trend);
-        marginTrends.take(trend);
-      }
-      page.dirty.add("trends");
-    }
-    status();
-  },
-  onBytes: (data) => {
-    for (const frame of framesOf(data)) takeFrame(frame);
-  },
-});
 
 /** @param {Frame | Fits} frame */
 function takeFrame(frame) {
