@@ -16,6 +16,7 @@ REMOVING_MODULES = {
     "src/livebode/core/files.py": "moves what was written beside its place",
     "wings/plant/src/livebode_plant/lake/table_directory.py": "objects of a storage, by the names of data files",
     "src/livebode/records/segments/disk.py": "cuts a partly written piece off a file that is the run's own",
+    "tools/bundle.py": "the directory of its own earlier bundles",
     "tools/stored.py": "its own files in the environment that were not read for a week",
     "tools/wheels/__main__.py": "earlier wheels of livebode in dist/, by name",
 }
