@@ -30,7 +30,7 @@ PAGES = {"fleet.html", "index.html", "login.html", "measure.html", "runs.html", 
 def files() -> dict[str, static_files.StaticFile]:
     """Everything that a server can have, with current bundles: without them tests are skipped, and fail in CI."""
     found = static_files.static_files(sources())
-    if {page for page in PAGES if is_bundled(found[page].content)} != PAGES:
+    if {page for page in PAGES if is_bundled(found[page].body)} != PAGES:
         message = "the bundles are missing or not current: make bundle"
         pytest.fail(message) if os.environ.get("CI") else pytest.skip(message)
     return found
@@ -56,9 +56,9 @@ def test_a_page_is_served_without_its_bundle_where_any_of_its_files_differs() ->
     assert {"index.html", "main.js", "additions.js", "icon.svg", "print.css", "uplot/uPlot.esm.js"} <= of_page
     for name in ("index.html", "main.js", "address.js", "additions.js", "icon.svg", "print.css", "uplot/uPlot.esm.js"):
         changed = static_files.static_files(now | {name: now[name] + b" "})
-        assert changed["index.html"].content.startswith(now["index.html"]), name
+        assert changed["index.html"].body.startswith(now["index.html"]), name
         assert not any(key.startswith("index-") for key in changed), name
-    assert is_bundled(static_files.static_files(now | {"bode.js": b""})["runs.html"].content)  # it has no plot
+    assert is_bundled(static_files.static_files(now | {"bode.js": b""})["runs.html"].body)  # it has no plot
 
 
 def _manifest() -> dict[str, dict[str, dict[str, str]]]:
@@ -223,11 +223,11 @@ def test_source_maps_lead_to_lines_of_the_files_that_are_served(files: dict[str,
     maps = [name for name in files if name.endswith(".map")]
     assert len(maps) == 2 * len(PAGES)
     for name in maps:
-        bundle = files[name.removesuffix(".map")].content.decode()
+        bundle = files[name.removesuffix(".map")].body.decode()
         assert f"sourceMappingURL={name}" in bundle[-200:]
-        facts = json.loads(files[name].content)
+        facts = json.loads(files[name].body)
         paths = [urljoin(f"/static/{name}", path) for path in facts["sources"]]
-        texts = [files[path.removeprefix("/static/")].content.decode().splitlines() for path in paths]
+        texts = [files[path.removeprefix("/static/")].body.decode().splitlines() for path in paths]
         letters = exact = 0
         lines = bundle.splitlines()
         for (line, column, *place), (line_after, column_after, *_) in pairwise(segments(facts["mappings"])):
@@ -261,11 +261,11 @@ def test_the_licence_of_what_is_bundled_remains(files: dict[str, static_files.St
     for page in PAGES:
         if "uplot/uPlot.esm.js" in _manifest()[page]["sources"]:
             (script,) = (name for name in files if re.fullmatch(rf"{page.removesuffix('.html')}-\w+\.js", name))
-            assert b"Leon Sorokin" in files[script].content
-            assert b"MIT Licensed" in files[script].content
+            assert b"Leon Sorokin" in files[script].body
+            assert b"MIT Licensed" in files[script].body
 
 
 def test_what_the_page_of_a_run_loads_is_small(files: dict[str, static_files.StaticFile]) -> None:
-    loaded = [files[name].content for name in files if re.fullmatch(r"index(-\w+\.(js|css)|\.html)", name)]
+    loaded = [files[name].body for name in files if re.fullmatch(r"index(-\w+\.(js|css)|\.html)", name)]
     assert len(loaded) == 3
     assert sum(len(gzip.compress(content)) for content in loaded) < 110_000

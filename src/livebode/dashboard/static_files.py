@@ -48,7 +48,7 @@ class StaticFile(Response):
 
     def __init__(self, content: bytes, media_type: str, *, is_hashed: bool = False, vary: str = "") -> None:
         super().__init__(content, media_type=media_type)
-        self.content, self.digest = content, hashlib.sha256(content).hexdigest()
+        self.digest = hashlib.sha256(content).hexdigest()
         self.headers["etag"] = f'W/"{self.digest[:16]}"'
         self.headers["cache-control"] = f"max-age={_YEAR_S}, immutable" if is_hashed else "no-cache"
         self.headers["vary"] = f"accept-encoding, {vary}" if vary else "accept-encoding"
@@ -65,7 +65,7 @@ class StaticFile(Response):
 
     @cached_property
     def _compressed(self) -> Response:
-        content = gzip.compress(self.content, mtime=0)
+        content = gzip.compress(self.body, mtime=0)
         headers = {**self.headers, "content-encoding": "gzip", "content-length": str(len(content))}
         return Response(content, headers=headers)
 
