@@ -169,7 +169,7 @@ def answer(url: str, path: str, **headers: str) -> tuple[int, dict[str, str], by
     return found.status, {name.lower(): value for name, value in found.getheaders()}, body
 
 
-def test_hashed_files_are_stored_for_ever_and_all_others_asked_for_again(
+def test_hashed_files_are_stored_for_a_year_and_all_others_asked_for_again(
     files: dict[str, static_files.StaticFile], watched: Watched
 ) -> None:
     hashed = [name for name in files if name.startswith("index-")]
