@@ -253,6 +253,6 @@ def attacks(count: int) -> Iterator[tuple[str, Callable[[Attacked, threading.Eve
     yield "answers never read", held(count // 4, "GET /static/uplot/uPlot.esm.js {head}\r\n" * 8, deaf=True)
     yield "opened and closed", flood
     yield "short log-in pages", short(2 * count, ["/login"])
-    yield "short catalogues", short(2 * count, [f"/catalogue?language={code}" for code in ("de", "en", "zh_CN", "x")])
+    yield "short files", short(2 * count, ["/catalogue", "/static/main.js", "/static/bode.js"])
     yield "short exports", short(2 * count, [f"/api/export?axis=0&from=0&to={to}" for to in range(1, 20)])
     yield "short responses", short(2 * count, [f"/api/moment?axis=0&from={at}&to={at}" for at in range(20)], reset=True)
