@@ -17,10 +17,11 @@ from livebode.kernel import (
     LineMoments,
     LineSettings,
     LineWindows,
+    Machine,
     NewestWindows,
     instruction_sets,
-    process_each,
     process_lines,
+    process_newest,
 )
 from tests.twins import lines as line_twin
 
@@ -174,29 +175,48 @@ def test_any_division_of_the_windows_gives_the_same_bits(case):
     assert_same_bits(whole, parts)
 
 
+def machine(case: Case) -> Machine:
+    return Machine(case.moments(), np.zeros(3), np.full(3, np.inf), False)
+
+
+def chosen(case: Case) -> tuple[np.ndarray, np.ndarray]:
+    return np.array([2, 0, 1]), np.arange(case.lines)[::-1].copy()
+
+
 @settings(max_examples=60, deadline=None)
-@given(cases, st.integers(1, 5))
-def test_windows_of_several_machines_have_the_bits_of_each_alone_and_of_the_twin(case, machines):
+@given(cases, st.integers(1, 5), st.sampled_from([1.5, 100.0]))
+def test_windows_of_several_machines_have_the_bits_of_each_alone_and_of_the_twin(case, machines, factor):
     numbers, about = Numbers(case), case.settings._replace(noise=NOISE_SCATTER, noise_dof=np.inf)
-    each, alone, of_twin = ([case.moments() for _ in range(machines)] for _ in range(3))
-    largest = np.zeros(machines)
+    each, alone, of_twin = ([machine(case) for _ in range(machines)] for _ in range(3))
+    largest, ends = np.zeros(machines), False
     for _ in case.pieces:
-        place = numbers._rng.integers(0, case.places, machines)
-        windows = NewestWindows(largest, place, numbers.complex_(3, machines, case.lines), numbers.reals(machines, 3))
-        found, after = process_each(about, each, windows)
-        expected, expected_after = line_twin.process_each(about, of_twin, windows)
-        assert_same_bits(found, expected)
+        place, due = numbers._rng.integers(0, case.places, machines), numbers.flags(0.8, machines)
+        each, alone, of_twin = ([one._replace(ends=ends) for one in every] for every in (each, alone, of_twin))
+        sums = numbers.complex_(3, machines, case.lines + case.bins_beside)
+        windows = NewestWindows(largest, place, sums, chosen(case), numbers.reals(machines, 3), due)
+        found, after, taken = process_newest(about, each, windows, factor)
+        expected, expected_after, expected_taken = line_twin.process_newest(about, of_twin, windows, factor)
+        assert taken.tolist() == expected_taken.tolist()
         assert after.tobytes() == expected_after.tobytes()
-        yes = np.ones(1, np.bool_)
+        if taken.any():
+            assert_same_bits(found, expected)
         for i in range(machines):
-            spectrum, moment = windows.spectrum[:, [i]].copy(), windows.moment[[i]].T.copy()
-            one = LineWindows(largest[i], place[i], spectrum, None, yes, yes, *[None] * 5, np.inf, moment)
-            rows, _ = process_lines(about, alone[i], one)
-            own = found._replace(moment=found.moment.T)
-            assert_same_bits(rows._replace(moment=rows.moment.T), type(own)(*(part[[i]] for part in own)))
-            assert_same_bits(each[i], of_twin[i])
-            assert_same_bits(each[i], alone[i])
-        largest = after
+            own = windows._replace(
+                largest=largest[[i]],
+                place=place[[i]],
+                sums=sums[:, [i]].copy(),
+                moment=windows.moment[[i]],
+                due=due[[i]],
+            )
+            rows, _, _ = process_newest(about, [alone[i]], own, factor)
+            if taken[i]:
+                row, joined = int(taken[:i].sum()), found._replace(moment=found.moment.T)
+                assert_same_bits(rows._replace(moment=rows.moment.T), type(rows)(*(part[[row]] for part in joined)))
+            for other in (of_twin[i], alone[i]):
+                assert_same_bits(each[i].moments, other.moments)
+                assert each[i].sizes.tobytes() == other.sizes.tobytes()
+                assert each[i].limits.tobytes() == other.limits.tobytes()
+        largest, ends = after, not ends
 
 
 @pytest.mark.parametrize(
@@ -206,23 +226,30 @@ def test_windows_of_several_machines_have_the_bits_of_each_alone_and_of_the_twin
         {"place": np.array([0, -1])},
         {"place": np.array([0])},
         {"largest": np.zeros(3)},
-        {"spectrum": np.zeros((3, 3, 2), np.complex128)},
-        {"spectrum": np.zeros((1, 2, 2), np.complex128)},
-        {"spectrum": np.zeros((3, 2, 1), np.complex128)},
+        {"sums": np.zeros((3, 3, 2), np.complex128)},
+        {"sums": np.zeros((1, 2, 2), np.complex128)},
+        {"sums": np.zeros((3, 2, 1), np.complex128)},
+        {"chosen": (np.array([0, 1, 3]), np.array([0, 1]))},
+        {"chosen": (np.array([0, 1, -1]), np.array([0, 1]))},
+        {"chosen": (np.array([0, 1, 2]), np.array([0, 2]))},
+        {"chosen": (np.array([0, 1, 2]), np.array([0]))},
+        {"chosen": (np.array([0]), np.array([0, 1]))},
         {"moment": np.zeros((3, 2))},
+        {"due": np.ones(3, np.bool_)},
     ],
 )
 def test_of_several_machines_none_changes_where_an_array_is_refused(wrong):
     case = Case(2, 2, 0, 0.8, False, 1, 2, NOISE_SCATTER, 0.0, False, False, 4.0, 0, (3,), 0)
-    each, zeros = [case.moments(), case.moments()], np.zeros(2, np.int64)
-    windows = NewestWindows(np.zeros(2), zeros, Numbers(case).complex_(3, 2, 2), np.zeros((2, 3)))
-    with pytest.raises(ValueError, match=r"array|few|place"):
-        process_each(case.settings, each, windows._replace(**wrong))
-    other = [case.moments(), replace(case, lines=3).moments()]
+    each, zeros = [machine(case), machine(case)], np.zeros(2, np.int64)
+    due, sums = np.ones(2, np.bool_), Numbers(case).complex_(3, 2, 2)
+    windows = NewestWindows(np.zeros(2), zeros, sums, chosen(case), np.zeros((2, 3)), due)
+    with pytest.raises(ValueError, match=r"array|few|place|such"):
+        process_newest(case.settings, each, windows._replace(**wrong), 1e8)
+    other = [machine(case), machine(replace(case, lines=3))]
     with pytest.raises(ValueError, match="array"):
-        process_each(case.settings, other, windows)
-    for moments in (*each, other[0]):
-        assert_same_bits(moments, case.moments())
+        process_newest(case.settings, other, windows, 1e8)
+    for one in (*each, other[0]):
+        assert_same_bits(one.moments, case.moments())
 
 
 @pytest.mark.parametrize(

@@ -25,8 +25,8 @@ def test_the_loop_calls_its_steps_in_the_order_of_the_page() -> None:
     call = r"self\.(?:_recorder\.|_stream\.)?(\w+)\("
     assert re.findall(call, inspect.getsource(RunLoop._steps))[::2] == ["_numbered", "pieces", "_wait_for_record"]
     assert re.findall(call, inspect.getsource(RunLoop._process)) == [
-        "write_samples", "_publish_noticed", "publish_all", "_count", "_estimate", "_report_events", "announce",
-        "_publish_findings", "commit",
+        "write_samples", "_publish_noticed", "publish_all", "_count", "_joined", "_estimate", "_report_events",
+        "announce", "_publish_findings", "commit",
     ]  # fmt: skip
     rules = r"self\.estimate\.(\w+)\("
     assert re.findall(rules, inspect.getsource(RunLoop._process)) == ["monitor", "process", "check"]

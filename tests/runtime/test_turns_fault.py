@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterator
 from contextvars import ContextVar
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 from livebode.records import RunRecord, Store
 from livebode.runtime import Document, Subscriber, TrackerResults
+from livebode.runtime.joining import Steps, WaitingSpectra
 from livebode.runtime.turns import Turn
 from tests.support.live_session import LiveSession, Stuck
 from tests.support.peers.peer import PATIENCE_S, RATE_HZ, SAMPLES, batches, until
@@ -29,12 +30,12 @@ class Axes:
         self.turns: dict[int, Turn] = {}
         self.threads: dict[int, threading.Thread] = {}
 
-    def begin(self, number: int, steps: Iterator[bool]) -> None:
+    def begin(self, number: int, steps: Steps) -> None:
         self.threads[number] = threading.Thread(target=self._run, args=(number, steps))
         self.threads[number].start()
         until(lambda: number in self.turns, "its turn")
 
-    def _run(self, number: int, steps: Iterator[bool]) -> None:
+    def _run(self, number: int, steps: Steps) -> None:
         OWN.set(number)
         self.turns[number] = Turn(steps)
         try:
@@ -51,7 +52,7 @@ class Axes:
 def test_one_axis_computes_at_a_time_and_all_do_whoever_ends_first() -> None:
     axes, inside, together = Axes(), [], []
 
-    def steps(count: int) -> Iterator[bool]:
+    def steps(count: int) -> Steps:
         for _ in range(count):
             inside.append(None)
             together.append(len(inside))
@@ -68,7 +69,7 @@ def test_one_axis_computes_at_a_time_and_all_do_whoever_ends_first() -> None:
 def test_steps_are_done_in_the_order_of_asking_in_the_context_of_their_axis() -> None:
     axes, gate, order = Axes(), threading.Event(), []
 
-    def steps(number: int) -> Iterator[bool]:
+    def steps(number: int) -> Steps:
         yield False
         while not gate.is_set():  # the first axis holds the turn until all have asked
             assert number == 0
@@ -89,12 +90,12 @@ def test_steps_are_done_in_the_order_of_asking_in_the_context_of_their_axis() ->
 def test_an_error_ends_its_own_axis_whoever_did_the_step() -> None:
     axes, go_on = Axes(), threading.Event()
 
-    def fails() -> Iterator[bool]:
+    def fails() -> Steps:
         while not go_on.is_set():
             yield False
         raise OSError("the disk is full")
 
-    def runs() -> Iterator[bool]:
+    def runs() -> Steps:
         while 1 not in axes.errors:
             yield False
 
@@ -107,10 +108,62 @@ def test_an_error_ends_its_own_axis_whoever_did_the_step() -> None:
         raise axes.errors[1]
 
 
+def spectra(kind: object) -> WaitingSpectra:
+    """What ends the step of an axis that nobody is like."""
+    return WaitingSpectra(SimpleNamespace(kind=kind), SimpleNamespace(channels=(), rate_hz=1.0))  # type: ignore[arg-type]
+
+
+def test_steps_that_end_at_spectra_continue_with_what_is_computed_for_all_that_wait(monkeypatch) -> None:
+    axes, gate, together, answers = Axes(), threading.Event(), [], {}
+
+    def joined(waiting: list[WaitingSpectra]) -> list[Any]:
+        together.append([one.tracker.kind for one in waiting])
+        return [f"of {one.tracker.kind}" for one in waiting]
+
+    monkeypatch.setattr("livebode.runtime.turns.track_together", joined)
+
+    def steps(number: int) -> Steps:
+        yield False
+        while not gate.is_set():  # the first axis holds the turn until all have asked
+            gate.wait(PATIENCE_S)
+        answers[number] = (yield spectra(number)), OWN.get()
+
+    for number in range(4):
+        axes.begin(number, steps(number))
+    until(lambda: all(turn.stepped_s > 0 and not turn.works for turn in axes.turns.values()), "all to have begun")
+    for number in (0, 3, 1, 2):
+        axes.turns[number].ask()
+        until(lambda number=number: axes.turns[number].waits or axes.turns[number].works, "it to wait")
+    gate.set()
+    axes.join()
+    assert sorted(number for those in together for number in those) == [0, 1, 2, 3]
+    assert answers == {number: (f"of {number}", number) for number in range(4)}
+    assert not axes.errors
+
+
+def test_an_axis_whose_spectra_wait_continues_where_another_does_not_return() -> None:
+    axes, continued = Axes(), threading.Event()
+
+    def waits() -> Steps:
+        while 1 not in axes.turns:
+            yield False
+        assert (yield spectra("a")) is None
+        continued.set()
+
+    def stays() -> Steps:
+        yield False
+        assert continued.wait(PATIENCE_S)
+
+    axes.begin(0, waits())
+    axes.begin(1, stays())
+    axes.join()
+    assert not axes.errors
+
+
 def test_samples_that_come_during_a_step_make_another_one_due() -> None:
     axes, asked, done = Axes(), threading.Event(), []
 
-    def steps() -> Iterator[bool]:
+    def steps() -> Steps:
         axes.turns[0].ask()  # as its receiver does
         asked.set()
         yield False

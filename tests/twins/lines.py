@@ -21,6 +21,7 @@ from livebode.kernel import (
     LineRows,
     LineSettings,
     LineWindows,
+    Machine,
     NewestWindows,
     WeightSums,
 )
@@ -49,17 +50,34 @@ def process_lines(settings: LineSettings, moments: LineMoments, windows: LineWin
         return _process(settings, moments, windows)
 
 
-def process_each(settings: LineSettings, moments: list[LineMoments], windows: NewestWindows) -> tuple[LineRows, Floats]:
-    """One window of each of several machines with the same settings."""
-    yes, found = np.ones(1, dtype=np.bool_), []
-    for i, own in enumerate(moments):
-        spectrum, moment = windows.spectrum[:, i : i + 1], windows.moment[i : i + 1].T
-        begin = float(windows.largest[i]), int(windows.place[i]), np.ascontiguousarray(spectrum)
-        one = LineWindows(*begin, None, yes, yes, None, None, None, None, None, np.inf, np.ascontiguousarray(moment))
-        found.append(process_lines(settings, own, one))
-    rows = [one._replace(moment=one.moment.T) for one, _ in found]
-    joined = LineRows(*map(np.concatenate, zip(*rows)))
-    return joined._replace(moment=joined.moment.T), np.array([largest for _, largest in found])
+def process_newest(
+    settings: LineSettings, machines: list[Machine], windows: NewestWindows, factor: float
+) -> tuple[LineRows, Floats, Flags]:
+    """One window of each of several machines with the same settings; rows of those that take it."""
+    yes, found, largest, taken = np.ones(1, dtype=np.bool_), [], windows.largest.copy(), windows.due.copy()
+    signals, columns = windows.chosen
+    for i, own in enumerate(machines):
+        spectrum = np.ascontiguousarray(windows.sums[signals, i : i + 1][:, :, columns])
+        sizes = np.hypot(spectrum.real, spectrum.imag)[:, 0]
+        with np.errstate(invalid="ignore"):
+            most = np.maximum(own.sizes, sizes.max(axis=1))
+        taken[i] &= np.isfinite(sizes).all() and not np.any(most > own.limits)
+        if not taken[i]:
+            continue
+        moment = np.ascontiguousarray(windows.moment[i : i + 1].T)
+        begin = float(largest[i]), int(windows.place[i]), spectrum
+        one = LineWindows(*begin, None, yes, yes, None, None, None, None, None, np.inf, moment)
+        rows, largest[i] = process_lines(settings, own.moments, one)
+        found.append(rows._replace(moment=rows.moment.T))
+        own.sizes[:] = 0.0 if own.ends else most
+        if own.ends:
+            own.limits[:] = np.where(most > 0, factor * most, np.inf)
+    if not found:
+        lines = len(columns)
+        empty = [np.zeros((0, lines))] * 6 + [np.zeros((0, lines), np.bool_), np.zeros(0), np.zeros((3, 0))]
+        return LineRows(*empty, np.zeros(0, np.bool_)), largest, taken
+    joined = LineRows(*map(np.concatenate, zip(*found)))
+    return joined._replace(moment=joined.moment.T), largest, taken
 
 
 def add_windows(

@@ -59,7 +59,7 @@ class Overview:
         self._seen += len(responses)
         if self._parts and first >= len(responses):
             return  # nearly always, in a long run; one empty part is enough to name the lines
-        self._append(responses[first :: self._stride])
+        self._append(responses if self._stride == 1 else responses[first :: self._stride])
         most = min(ROWS_MAX, max(_ROWS_MIN, self._values_max / len(responses.lines)))
         while self._rows > most:
             thinned = Responses.join(self._parts)[::2]
@@ -69,7 +69,7 @@ class Overview:
 
     def _append(self, responses: Responses) -> None:
         # Joining copies: a view would keep the omitted rows in memory.
-        self._parts.append(Responses.join([responses]))
+        self._parts.append(responses if self._stride == 1 else Responses.join([responses]))
         self._rows += len(responses)
         if len(self._parts) > _PARTS_MAX:
             self._parts = [Responses.join(self._parts)]

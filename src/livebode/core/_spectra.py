@@ -198,15 +198,18 @@ class Spectra(Block):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        shape = (len(self.layout.signals), len(self), len(self.layout.bins))
+        shape = (len(self.layout.signals), self.data.shape[1], len(self.layout.bins))
         if self.sums.shape != shape or self.state.shape != shape[1:2]:
             raise UsageError(
                 "wrong-shape",
-                f"sums of shape {self.sums.shape} and states of shape {self.state.shape} for {len(self)} spectra",
+                f"sums of shape {self.sums.shape} and states of shape {self.state.shape} for {shape[1]} spectra",
                 f"give {shape} and {shape[1:2]}",
                 argument="sums",
                 shape=list(self.sums.shape),
             )
+
+    def __len__(self) -> int:
+        return len(self.state)
 
     @property
     def stop(self) -> int:

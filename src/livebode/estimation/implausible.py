@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,8 +9,8 @@ from livebode.arrays import Floats
 from livebode.core import Stage, StatefulBase
 from livebode.kernel import largest_sizes
 
-# Against a sample this much larger, 16 digits leave 8 for everything else until the kernel renews its sums.
-_FACTOR = 1e8
+FACTOR = 1e8
+"""Against a sample this much larger, 16 digits leave 8 for everything else until the kernel renews its sums."""
 _NONE = np.zeros(0, dtype=np.intp)
 
 
@@ -43,28 +41,14 @@ class PlausibleRange(StatefulBase):
             self._end_period()
         return np.concatenate(pieces) if pieces else _NONE
 
-    @staticmethod
-    def are_plausible(ranges: Sequence[PlausibleRange], size: Floats) -> tuple[NDArray[np.bool_], Floats]:
-        """Which of the ranges find nothing in their next sample, of sizes (ranges, channels); for `take_each` the
-        largest sizes of the period so far, same shape.
+    @property
+    def newest(self) -> tuple[Floats, Floats, bool]:
+        """For `process_newest`: largest sizes of the period, their limits, and whether the next sample ends it."""
+        return self._largest, self._limit, self._at + 1 == self._window
 
-        No range changes.
-        """
-        every = np.maximum(np.array([own._largest for own in ranges]), size)
-        limits = np.array([own._limit for own in ranges])
-        return np.asarray(~(every > limits).any(axis=1)), every
-
-    @staticmethod
-    def process_each(ranges: Sequence[PlausibleRange], every: Floats) -> None:
-        """Continue ranges of one length with a plausible sample each, as `process` would."""
-        for own, largest, limit in zip(ranges, every, _limits(every)):
-            own._at += 1
-            if own._at == own._window:
-                own._at = 0
-                own._largest.fill(0.0)
-                own._limit[:] = limit
-            else:
-                own._largest[:] = largest
+    def count(self) -> None:
+        """The next sample was added to the arrays of `newest`."""
+        self._at = (self._at + 1) % self._window
 
     def _found(self, data: Floats, every: Floats) -> list[NDArray[np.intp]]:
         """Implausible samples, in pieces that begin a period, or continue the one that has begun."""
@@ -95,7 +79,7 @@ class PlausibleRange(StatefulBase):
 def _limits(largest: Floats) -> Floats:
     """Limits of the next period. A signal that was zero gives no scale for what is too large."""
     with np.errstate(over="ignore"):  # there is no larger number
-        return np.where(largest > 0, _FACTOR * largest, np.inf)
+        return np.where(largest > 0, FACTOR * largest, np.inf)
 
 
 _COMPARED = 3  # the smallest number of periods whose median one spike cannot move

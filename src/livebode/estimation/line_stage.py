@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.arrays import Complex, Flags, Floats
+from livebode.arrays import Complex, Flags, Floats, Integers
 from livebode.core import Channel, Event, PlantKinds, Responses, SourceUnit, Stage, StatefulBase
 from livebode.estimation.detection import DetectionNoise, beyond
+from livebode.estimation.implausible import FACTOR, PlausibleRange
 from livebode.estimation.movement import Movement
 from livebode.estimation.periodicity import Periodicity
 from livebode.estimation.periods import PeriodMoments
@@ -27,10 +28,11 @@ from livebode.kernel import (
     LineRows,
     LineSettings,
     LineWindows,
+    Machine,
     NewestWindows,
     chosen_instruction_set,
-    process_each,
     process_lines,
+    process_newest,
 )
 from livebode.language import Message
 
@@ -233,12 +235,15 @@ class LineStage(StatefulBase):
     @staticmethod
     def process_each(
         stages: Sequence[LineStage],
-        spectrum: Complex,
-        sample: NDArray[np.int64],
-        place: NDArray[np.int64],
+        ranges: Sequence[PlausibleRange],
+        sums: Complex,
+        chosen: tuple[Integers, Integers],
+        sample: Integers,
+        place: Integers,
         centre: Floats,
+        due: Flags,
         channels: Sequence[Channel],
-    ) -> Responses:
+    ) -> tuple[Responses | None, Flags]:
         """One response of each of several stages with equal settings that are `is_plain`: a row for each stage.
 
         The bits are those of `process` for each stage alone. Where this raises, no stage has changed.
@@ -247,26 +252,36 @@ class LineStage(StatefulBase):
         ----------
         stages
             Different ones.
-        spectrum, sample, place, centre, channels
-            As in `process`, with a row for each stage; every window is whole and clean.
+        ranges
+            Of each stage, that of the magnitudes of its spectra.
+        sums, chosen, due
+            As in `NewestWindows`.
+        sample, place, centre, channels
+            As in `process`, with a row for each stage.
+
+        Returns
+        -------
+        responses, taken
+            Rows of the stages that took their spectrum, None without one, and which these are, (stages,). The spectra
+            of others are not due, not finite or implausible; they have not changed.
         """
         example = stages[0]
         s = example._settings
-        first = sample - s.lines.window + 1
-        windows = NewestWindows(
-            np.array([stage._largest for stage in stages]),
-            (place // s.step - 1) % example._places,
-            np.ascontiguousarray(spectrum),
-            np.stack([*centre, first], axis=1),
-        )
-        unit = example._unit_of(channels)
-        with np.errstate(all="ignore"):
-            results, largest = process_each(
-                example._kernel_settings, [stage._moments.arrays for stage in stages], windows
-            )
-            for stage, power_max in zip(stages, largest.tolist()):
+        moment = np.empty((len(stages), 3))
+        moment[:, :2], moment[:, 2] = centre.T, sample - (s.lines.window - 1)
+        largest, places = np.array([stage._largest for stage in stages]), (place // s.step - 1) % example._places
+        machines = [Machine(stage._moments.arrays, *own.newest) for stage, own in zip(stages, ranges)]
+        windows = NewestWindows(largest, places, sums, chosen, moment, due)
+        results, largest, taken = process_newest(example._kernel_settings, machines, windows, FACTOR)
+        for stage, own, power_max, is_taken in zip(stages, ranges, largest.tolist(), taken.tolist()):
+            if is_taken:
                 stage._largest = power_max
-            return _as_responses(s, results, LineEstimates.of(results), sample, unit)
+                own.count()
+        if not len(results.dof):
+            return None, taken
+        if len(results.dof) < len(stages):
+            sample = sample[taken]
+        return _as_responses(s, results, LineEstimates.of(results), sample, example._unit_of(channels)), taken
 
     def _detected(self, signals: dict[Role, Complex]) -> Floats | None:
         """Noise of one window by the detection lines, as a power of numerator·conj(reference); None without them."""

@@ -34,6 +34,7 @@ from livebode.estimation.ripple import HopSpeed, ripple_power
 from livebode.estimation.spectra import SpectraRows, after
 from livebode.estimation.stream_estimator import StreamCounters, StreamEstimator
 from livebode.estimation.tracker_settings import Settings
+from livebode.kernel import largest_magnitudes
 from livebode.language import Message
 
 DRIVE = {
@@ -180,6 +181,10 @@ class SpectraTracker(StreamEstimator[SpectraInputStatistics]):
         self._columns = layout.columns([int(k) for k in bins], why)
         advanced, differenced = np.array(settings.advanced_ticks), np.array(layout.differenced)[self._signals]
         self._after = after(bins, layout.window, differenced, advanced)[:, np.newaxis]
+        self._is_plain = bool(np.all(self._after == 1))
+        self._chosen = np.array(self._signals, dtype=np.int64), self._columns.astype(np.int64)
+        values = [channel.name for channel in layout.values]
+        self._schedule = values.index(settings.schedule) if settings.schedule else None
         self._watch = SpectraInputStatistics(self._events, layout.window, self._sentences)
         self._range = PlausibleRange(len(self._signals), max(1, layout.window // layout.hop))
         self._speed = HopSpeed(settings.lines.rate_hz) if settings.ripple else None
@@ -210,12 +215,17 @@ class SpectraTracker(StreamEstimator[SpectraInputStatistics]):
                 "these spectra do not have the layout of the tracker",
                 "make another tracker",
             )
+        if len(block) == 1 and (usual := self.usual(block)) is not None:
+            responses, _ = self.process_each([self], usual)
+            if responses is not None:
+                return responses
         hop, window = self._layout.hop, self._layout.window
         sums, sample = block.sums.take(self._signals, axis=0).take(self._columns, axis=2), block.sample
         finite = np.asarray(np.isfinite(sums).all(axis=(0, 2)))
         with np.errstate(over="ignore", invalid="ignore"):  # responses from implausible numbers are excluded
-            spectrum = (sums if finite.all() else np.where(finite[:, np.newaxis], sums, 0.0)) * self._after
-            size = np.abs(spectrum).max(axis=2)
+            spectrum = sums if finite.all() else np.where(finite[:, np.newaxis], sums, 0.0)
+            spectrum = spectrum if self._is_plain else spectrum * self._after
+            size = largest_magnitudes(np.ascontiguousarray(spectrum))
         if not np.isfinite(size).all():
             size = np.nan_to_num(size)
         implausible = np.zeros(len(block), dtype=np.bool_)
@@ -237,10 +247,25 @@ class SpectraTracker(StreamEstimator[SpectraInputStatistics]):
         hand_over(self._events, emit)
         return responses
 
-    @property
+    def usual(self, block: Block) -> NewestSpectra | None:
+        """The spectra of the Block as those of several machines, if `process_each` supports them one by one."""
+        if not isinstance(block, Spectra) or block.layout != self._layout:
+            return None
+        if self.kind is None or block.gap or block.origin_s or any(block.state.tolist()):
+            return None
+        values = np.empty((len(self._layout.values), len(block)))
+        if self._schedule is not None:
+            values[self._schedule] = block[self.settings.schedule or ""]
+        start, place = np.array([block.start]), np.array([block.place])
+        if len(block) > 1:
+            passed = self._layout.hop * np.arange(len(block))
+            start, place = start + passed, (place + passed) % self._layout.window
+        return NewestSpectra(block.sums, values, start, place, block.channels, block.rate_hz)
+
+    @cached_property
     def kind(self) -> object:
         """One object for all trackers that `process_each` computes together; None for one that it does not support."""
-        plain = self._lines.is_plain and self._speed is None and bool(np.all(self._after == 1))
+        plain = self._lines.is_plain and self._speed is None and self._is_plain
         return _kind(self._identity) if plain else None
 
     @staticmethod
@@ -264,31 +289,28 @@ class SpectraTracker(StreamEstimator[SpectraInputStatistics]):
             `process`.
         """
         example = trackers[0]
-        layout, settings = example._layout, example.settings
-        sums = spectra.sums.take(example._signals, axis=0).take(example._columns, axis=2)
-        with np.errstate(over="ignore", invalid="ignore"):
-            spectrum = sums * example._after
-            size = np.abs(spectrum).max(axis=2).T
-        plausible, every = PlausibleRange.are_plausible([tracker._range for tracker in trackers], size)
-        follows = [tracker._watch.continues_at(n) for tracker, n in zip(trackers, spectra.start.tolist())]
-        taken = plausible & np.isfinite(size).all(axis=1) & np.array(follows)
-        rows = np.flatnonzero(taken)
-        usual = [trackers[i] for i in rows.tolist()]
-        if not usual:
-            return None, taken
-        sample, window = spectra.start[rows] - 1 + layout.hop, layout.window
-        time_s = 0.0 + (sample - (window - 1) / 2) / spectra.rate_hz
-        schedule = np.full(len(rows), np.nan)
-        if settings.schedule:
-            names = [channel.name for channel in layout.values]
-            schedule = spectra.values[names.index(settings.schedule), rows]
-        stages = [tracker._lines for tracker in usual]
-        centre, place = np.stack([time_s, schedule]), spectra.place[rows]
-        responses = LineStage.process_each(stages, spectrum[:, rows], sample, place, centre, spectra.channels)
-        PlausibleRange.process_each([tracker._range for tracker in usual], every[rows])
-        for tracker in usual:
-            tracker._watch.count_whole(layout.hop)
-            tracker._ends_with(responses)
+        layout, window = example._layout, example._layout.window
+        sample = spectra.start + (layout.hop - 1)
+        centre = np.empty((2, len(trackers)))
+        centre[0] = 0.0 + (sample - (window - 1) / 2) / spectra.rate_hz
+        centre[1] = np.nan if example._schedule is None else spectra.values[example._schedule]
+        starts = spectra.start.tolist()
+        responses, taken = LineStage.process_each(
+            [tracker._lines for tracker in trackers],
+            [tracker._range for tracker in trackers],
+            spectra.sums,
+            example._chosen,
+            sample,
+            spectra.place,
+            centre,
+            np.array([tracker._watch.continues_at(start) for tracker, start in zip(trackers, starts)]),
+            spectra.channels,
+        )
+        if responses is not None:
+            for tracker, is_taken in zip(trackers, taken.tolist()):
+                if is_taken:
+                    tracker._watch.count_whole(layout.hop)
+                    tracker._ends_with(responses)
         return responses, taken
 
     @cached_property

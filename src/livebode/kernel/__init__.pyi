@@ -40,10 +40,12 @@ from livebode.kernel._lines import LineMoments as LineMoments
 from livebode.kernel._lines import LineRows as LineRows
 from livebode.kernel._lines import LineSettings as LineSettings
 from livebode.kernel._lines import LineWindows as LineWindows
+from livebode.kernel._lines import Machine as Machine
 from livebode.kernel._lines import NewestWindows as NewestWindows
 from livebode.kernel._lines import WeightSums as WeightSums
-from livebode.kernel._lines import process_each as process_each
+from livebode.kernel._lines import largest_magnitudes as largest_magnitudes
 from livebode.kernel._lines import process_lines as process_lines
+from livebode.kernel._lines import process_newest as process_newest
 from livebode.kernel._matrix import MatrixHistory as MatrixHistory
 from livebode.kernel._matrix import MatrixRows as MatrixRows
 from livebode.kernel._matrix import MatrixStage as MatrixStage

@@ -158,23 +158,48 @@ class LineWindows(NamedTuple):
     moment: Floats
 
 
+class Machine(NamedTuple):
+    """What is known of one of several machines before its next window; the arrays are changed.
+
+    Attributes
+    ----------
+    moments
+        Its moments.
+    sizes, limits
+        Largest magnitudes of each signal's spectra in the period so far, and their limits, shape (signals,).
+    ends
+        Whether the window is the last one of the period.
+    """
+
+    moments: LineMoments
+    sizes: Floats
+    limits: Floats
+    ends: bool
+
+
 class NewestWindows(NamedTuple):
-    """A window of each of several machines, whole and clean, without noise from detection lines or known errors.
+    """A window of each of several machines, without noise from detection lines or known errors.
 
     Attributes
     ----------
     largest, place
         As in `LineWindows`, of each machine, shape (machines,).
-    spectrum
-        Shape (signals, machines, lines).
+    sums
+        Spectra of all signals at all bins, shape (all, machines, bins).
+    chosen
+        Numbers of the signals, shape (signals,), and of the lines among the bins, shape (lines,).
     moment
         Time, schedule and oldest sample, shape (machines, 3).
+    due
+        Windows that are whole, clean, and follow the machine's previous one, shape (machines,).
     """
 
     largest: Floats
     place: Integers
-    spectrum: Complex
+    sums: Complex
+    chosen: tuple[Integers, Integers]
     moment: Floats
+    due: Flags
 
 
 class LineRows(NamedTuple):
@@ -203,16 +228,31 @@ def process_lines(settings: LineSettings, moments: LineMoments, windows: LineWin
     return results, _native.process_lines(settings, moments, windows, results)
 
 
-def process_each(settings: LineSettings, moments: list[LineMoments], windows: NewestWindows) -> tuple[LineRows, Floats]:
+def process_newest(
+    settings: LineSettings, machines: list[Machine], windows: NewestWindows, factor: float
+) -> tuple[LineRows, Floats, Flags]:
     """One window of each of several machines with the same settings, where noise is NOISE_SCATTER.
 
-    Returns the same bits as `process_lines` for each machine alone: rows, and largest powers, shape (machines,). Where
-    an argument is refused, no moments have changed.
+    Returns rows of the machines whose window is due, finite and within its limits, with the bits of `process_lines` for
+    each alone; largest powers, shape (machines,); and which machines these are, shape (machines,). Others have not
+    changed. At the end of a period the limits become `factor` times its largest magnitudes, or infinite where these are
+    0. Where an argument is refused, nothing has changed.
     """
-    machines, largest = len(moments), windows.largest.copy()
-    results = _rows(machines, windows.spectrum.shape[2], (machines, 3))
-    _native.process_each(settings, moments, largest, windows.place, windows.spectrum, windows.moment, results)
-    return results._replace(moment=results.moment.T), largest
+    count, largest, taken = len(machines), windows.largest.copy(), windows.due.copy()
+    results = _rows(count, len(windows.chosen[1]), (count, 3))
+    _, place, sums, chosen, moment, _ = windows
+    sums = np.ascontiguousarray(sums)
+    rows = _native.process_newest(settings, machines, largest, place, sums, chosen, moment, factor, results, taken)
+    if rows < count:
+        results = LineRows._make(part[:rows] for part in results)
+    return results._replace(moment=results.moment.T), largest, taken
+
+
+def largest_magnitudes(spectrum: Complex) -> Floats:
+    """Largest magnitude of each row, shape (signals, rows), of spectra (signals, rows, bins); NaN where one is NaN."""
+    largest = np.empty(spectrum.shape[:2])
+    _native.largest_magnitudes(spectrum, largest)
+    return largest
 
 
 def _rows(rows: int, lines: int, moment: tuple[int, int]) -> LineRows:

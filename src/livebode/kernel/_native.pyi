@@ -101,16 +101,20 @@ def judge_periods(
 class RepeatingPlan:
     def __init__(self, settings: tuple[Any, ...], /) -> None: ...
 
-def process_each(
+def process_newest(
     settings: tuple[Any, ...],
-    moments: list[Any],
+    machines: list[Any],
     largest: npt.NDArray[np.float64],
     place: npt.NDArray[np.int64],
-    spectrum: npt.NDArray[np.complex128],
+    sums: npt.NDArray[np.complex128],
+    chosen: tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]],
     moment: npt.NDArray[np.float64],
+    factor: float,
     out: tuple[Any, ...],
+    taken: npt.NDArray[np.bool_],
     /,
-) -> None: ...
+) -> int: ...
+def largest_magnitudes(spectrum: npt.NDArray[np.complex128], out: npt.NDArray[np.float64], /) -> None: ...
 
 class Engine:
     def __init__(

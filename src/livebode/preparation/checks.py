@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from livebode.core import ANY_EXCITATION, NOT_WHOLE, Block, SignalError, Spectra, Stage, StatefulBase, rms
@@ -14,6 +16,7 @@ _POWERLESS_DB = -80.0
 _REPEATS = 0.5  # noise alone repeats by 1/m over m periods
 _PERIODS_TO_JUDGE = 4
 _LISTED_MAX = 20
+_TOGETHER = 16  # Blocks, or spectra in one
 
 
 class ChannelCheck(StatefulBase):
@@ -26,11 +29,16 @@ class ChannelCheck(StatefulBase):
         self._unvaried = dict.fromkeys(names, np.nan)
         self._reference = reference
         self._moments = np.zeros(3)
+        self._waiting: list[Spectra] = []  # several cost little more than one
 
     def take(self, block: Block) -> None:
         """Check the signals that were constant so far."""
         if isinstance(block, Spectra):
-            self._take_spectra(block)
+            if self._waiting and self._waiting[0].layout is not block.layout:
+                self._take_waiting()
+            self._waiting.append(block)
+            if max(len(self._waiting), len(block)) >= _TOGETHER:
+                self._take_waiting()
             return
         x = block[self._reference]
         x = x[np.isfinite(x)]
@@ -44,13 +52,18 @@ class ChannelCheck(StatefulBase):
             if np.any(finite != value):
                 del self._unvaried[name]
 
-    def _take_spectra(self, block: Spectra) -> None:
+    def _take_waiting(self) -> None:
         """The same for spectra, where a constant signal has no power at the lines."""
-        examined = {self._reference, *self._unvaried}
-        at = [row for row, signal in enumerate(block.layout.signals) if signal.name in examined]
-        for row, level in zip(at, rms(block.sums[at], block.layout)):
-            signal = block.layout.signals[row]
-            level = level[(block.state & NOT_WHOLE == 0) & np.isfinite(level)]
+        blocks, self._waiting = self._waiting, []
+        if not blocks:
+            return
+        layout, examined = blocks[0].layout, {self._reference, *self._unvaried}
+        at = [row for row, signal in enumerate(layout.signals) if signal.name in examined]
+        state = np.concatenate([block.state for block in blocks])
+        sums = np.concatenate([block.sums for block in blocks], axis=1)
+        for row, level in ((row, rms(sums[row], layout)) for row in at):
+            signal = layout.signals[row]
+            level = level[(state & NOT_WHOLE == 0) & np.isfinite(level)]
             if signal.name == self._reference:
                 self._moments += level.size, 0.0, np.dot(level, level)
             if signal.name in self._unvaried and level.size:
@@ -58,14 +71,24 @@ class ChannelCheck(StatefulBase):
                 if np.any(level > 0):
                     del self._unvaried[signal.name]
 
+    def _state(self) -> dict[str, Any]:
+        self._take_waiting()
+        return super()._state()
+
+    def _load(self, state: dict[str, Any]) -> None:
+        self._waiting.clear()
+        super()._load(state)
+
     @property
     def variance(self) -> float:
         """Variance of the reference over all its finite samples."""
+        self._take_waiting()
         count, total, squares = self._moments
         return float(max(squares / count - (total / count) ** 2, 0.0)) if count else 0.0
 
     def finish(self) -> None:
         """SignalError if a signal had no finite sample, or a constant value."""
+        self._take_waiting()
         for name, value in self._unvaried.items():
             if np.isnan(value):
                 raise SignalError(

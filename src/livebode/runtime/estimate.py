@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from livebode.core import MatrixResponses, Response
     from livebode.fitting import Fit
     from livebode.runtime.feed import Feed, Source
+    from livebode.runtime.joining import WaitingSpectra
     from livebode.runtime.readiness import Readiness
     from livebode.runtime.recorder import Recorder
     from livebode.runtime.shedding import LoadShedding
@@ -238,6 +239,10 @@ class Estimate(ABC):
     def monitor(self, block: Block) -> Iterable[Event]:  # noqa: ARG002 - for kinds that monitor
         """Events of the samples, before they are processed."""
         return ()
+
+    def waiting_spectra(self, block: Block) -> WaitingSpectra | None:  # noqa: ARG002 - for kinds that are joined
+        """What of this Block can be tracked together with other axes; `process` gives the same results."""
+        return None
 
     @abstractmethod
     def process(self, block: Block) -> Any:

@@ -8,6 +8,7 @@ from contextlib import AbstractContextManager, nullcontext
 from typing import TYPE_CHECKING, Any, Protocol
 
 from livebode.core import Block, Channel, Emit, Event
+from livebode.runtime.joining import Steps
 from livebode.runtime.run_control import RunControl
 
 if TYPE_CHECKING:
@@ -81,7 +82,7 @@ class Feed:
         """Blocks with the run's numbers; None while the source is silent."""
         return self.source.blocks(channels, **self._delivery)
 
-    def run(self, steps: Iterator[bool], recorder: Recorder) -> None:
+    def run(self, steps: Steps, recorder: Recorder) -> None:
         """Do the steps of the loop."""
         for _ in steps:
             recorder.catch_up()

@@ -10,6 +10,7 @@ from livebode.core import Block, Emit, Event
 from livebode.runtime.clock_relation import ClockRelation
 from livebode.runtime.continuing import PreviousRun, StreamPosition
 from livebode.runtime.feed import Feed
+from livebode.runtime.joining import Steps
 from livebode.runtime.recorder import Recorder
 from livebode.runtime.run_control import RunControl
 from livebode.runtime.run_counts import CAUSES
@@ -57,7 +58,7 @@ class LiveFeed(Feed):
     def blocks(self, channels: Sequence[str]) -> Iterator[Block | None]:
         return self._live.stream(channels, wait_s=0.0)
 
-    def run(self, steps: Iterator[bool], recorder: Recorder) -> None:  # noqa: ARG002 - a step waits for it
+    def run(self, steps: Steps, recorder: Recorder) -> None:  # noqa: ARG002 - a step waits for it
         turn = Turn(steps)
         self._live.listen(turn.ask)
         turn.run()

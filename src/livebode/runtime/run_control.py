@@ -102,6 +102,8 @@ class RunControl:
 
     def take_record_section(self) -> RecordSection | None:
         """The new settings of the record, once."""
+        if self._record_section is None:
+            return None
         with self._lock:
             taken, self._record_section = self._record_section, None
         return taken
@@ -116,6 +118,8 @@ class RunControl:
 
     def take_reported(self, sample: int, time_s: float) -> list[Event]:
         """Reports since the last call, as events at the present sample and time."""
+        if not self._messages:
+            return []
         with self._lock:
             taken, self._messages = self._messages, []
         return [Event(kind, sample, time_s, message, details) for kind, message, details in taken]

@@ -71,6 +71,9 @@ class _Group:
     newest: Event | None = None
     """The newest event if it was only counted."""
 
+    def to_plain(self) -> dict[str, Any]:
+        return asdict(self) if self.waits else dict(vars(self))  # the same, without a copy of what does not change
+
     @property
     def waits(self) -> bool:
         return bool(self.waiting) or self.newest is not None
@@ -203,7 +206,7 @@ class EventGroups:
 
     def snapshot(self) -> bytes:
         """State as bytes; see `restore`."""
-        return encode(self._stage, {"groups": {cause: asdict(group) for cause, group in self._groups.items()}})
+        return encode(self._stage, {"groups": {cause: group.to_plain() for cause, group in self._groups.items()}})
 
     def restore(self, snapshot: bytes) -> None:
         """Continue from a snapshot; StateError, and nothing has changed, if that cannot be restored."""
@@ -262,9 +265,11 @@ class RunCounts:
 
     def take(self, valid: NDArray[np.bool_], tracked_s: float) -> None:
         """Count the results of a step by where they are valid, and its processing time in seconds."""
+        lines = int(np.count_nonzero(valid))
         self.responses += len(valid)
-        self.invalid += int(np.count_nonzero(~valid.all(axis=tuple(range(1, valid.ndim)))))
-        self.valid_lines += int(np.count_nonzero(valid))
+        if lines < valid.size:
+            self.invalid += int(np.count_nonzero(~valid.all(axis=tuple(range(1, valid.ndim)))))
+        self.valid_lines += lines
         self.tracked_s += tracked_s
 
     def judge(self) -> None:

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from math import gcd
 from typing import TYPE_CHECKING, Any, Self
 
 from livebode.configuration import RecordSection
-from livebode.core import Block, Event, LivebodeError, SignalError
+from livebode.core import Block, Event, LivebodeError, Responses, SignalError
 from livebode.preparation import ChannelCheck, check_length
 from livebode.runtime.allocation import keep_freed_memory
 from livebode.runtime.documents import (
@@ -26,6 +26,7 @@ from livebode.runtime.documents import (
 )
 from livebode.runtime.estimate import Estimate, Outcome, RunContext
 from livebode.runtime.feed import Feed
+from livebode.runtime.joining import Steps, WaitingSpectra
 from livebode.runtime.recorder import Destination, WholeRecord
 from livebode.runtime.run_control import StoppedError
 from livebode.runtime.run_counts import EventGroups, RunCounts
@@ -153,38 +154,47 @@ class RunLoop:
         if not self._counts.stop:
             raise SignalError("empty", "the recording has no samples", "choose another one")
 
-    def _steps(self) -> Iterator[bool]:
+    def _steps(self) -> Steps:
         """Process every Block, one in each step; whether the next step is due, or only when samples come."""
         for block in self._numbered():
             if block is None:
                 self._report_in_silence()
             else:
                 for piece in self._recorder.pieces(block):
-                    self._process(piece)
+                    yield from self._process(piece)
                     yield from self._wait_for_record()
             if self._control.changing:
                 break
             # Samples that complete no response wait for those that do, at most until the next tick.
             yield self.feed.is_due(self._step - self._counts.stop % self._step)
 
-    def _wait_for_record(self) -> Iterator[bool]:
+    def _wait_for_record(self) -> Steps:
         if self._recorder.is_behind:
             with self.feed.record_wait:
                 while self._recorder.is_behind:
                     yield False
 
-    def _process(self, block: Block) -> None:
+    def _process(self, block: Block) -> Steps:
         """One piece of samples through the house, in this order."""
         self._recorder.write_samples(block)
         self._publish_noticed(block)
         self._stream.publish_all(self.estimate.monitor(block))
         self._count(block)
-        self._estimate(lambda: self.estimate.process(block))
+        joined = yield from self._joined(block)
+        self._estimate(lambda: self.estimate.process(block) if joined is None else joined)
         self._report_events()
         self._stream.announce(TrackerResults(block, self.estimate.counts["samples"], self._source.samples))
         self._publish_findings(self.estimate.check(block))  # of seconds of samples at a time; no result waits for it
         with self.feed.record_wait:
             self._recorder.commit(block)
+
+    def _joined(self, block: Block) -> Generator[bool | WaitingSpectra, Responses | None, Any]:
+        """The results of a Block that is tracked together with other axes; None where it is tracked alone."""
+        spectra = self.estimate.waiting_spectra(block) if self.feed.live else None
+        joined = None if spectra is None else (yield spectra)
+        if joined is None or len(joined) == len(block):
+            return joined
+        return Responses.join([joined, self.estimate.process(block.cut(len(joined), len(block)))])
 
     def _estimate(self, process: Callable[[], Any]) -> None:
         """Compute results, and publish them."""
@@ -220,13 +230,15 @@ class RunLoop:
     def _report_events(self) -> None:
         """Publish the events since the last call."""
         self._stepped_s = time.monotonic()
-        self._stream.publish_all(self.feed.events(self._counts.stop))
-        self._stream.publish_all(self._events)
-        self._events.clear()
+        stop, time_s = self.position
+        self._stream.publish_all(self.feed.events(stop))
+        if self._events:
+            self._stream.publish_all(self._events)
+            self._events.clear()
         self._stream.publish_all(self._control.take_recorded())
-        self._stream.publish_all(self.feed.load_events(*self.position))
-        self._stream.publish_all(self._control.take_reported(*self.position))
-        self._stream.report_groups(self.position[1])
+        self._stream.publish_all(self.feed.load_events(stop, time_s))
+        self._stream.publish_all(self._control.take_reported(stop, time_s))
+        self._stream.report_groups(time_s)
         if (section := self._control.take_record_section()) is not None:
             self._recorder.limit(section)
 

@@ -233,6 +233,9 @@ class SegmentedRecord:
         """The samples of a Block that are not in the record yet, in pieces whose loss by a kill is short."""
         each = block.layout.hop if isinstance(block, Spectra) else 1
         known = -(-max(0, self._due_from - block.start) // each)
+        if not known and len(block) <= self._piece:
+            yield block
+            return
         for first in range(known, len(block), self._piece):
             yield block.cut(first, first + self._piece)
 

@@ -15,7 +15,7 @@ from livebode import fitting, preparation
 from livebode.analysis import LIVE_VALUES_MAX, Overview
 from livebode.configuration import Axis
 from livebode.core import INTERVAL_FACTOR, Block, Channel, Event, Lines, LivebodeError, Response, Responses, Stateful
-from livebode.estimation import Follower, Settings, plant_kinds
+from livebode.estimation import Follower, Settings, SpectraTracker, plant_kinds
 from livebode.language import Message
 from livebode.preparation import check_excitation, check_some_valid
 from livebode.records import RESPONSE_TABLES
@@ -29,6 +29,7 @@ from livebode.runtime.estimate import (
     RunContext,
     check_channels,
 )
+from livebode.runtime.joining import ROWS_MAX, WaitingSpectra
 
 if TYPE_CHECKING:
     from livebode.core import Parameters
@@ -298,6 +299,13 @@ class SingleResponse(Estimate):
         if self.detection is not None and (self.shedding is None or self.shedding.monitors()):
             for part in ready:
                 yield from self.detection.take_samples(part)
+
+    def waiting_spectra(self, block: Block) -> WaitingSpectra | None:
+        if self.readiness is not None or not isinstance(self.follower, SpectraTracker):
+            return None
+        if len(block) > ROWS_MAX or (spectra := self.follower.usual(block)) is None:
+            return None
+        return WaitingSpectra(self.follower, spectra)
 
     def process(self, block: Block) -> Responses:
         return self._marked(self.follower.process(block, self.events.append))

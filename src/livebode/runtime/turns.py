@@ -4,7 +4,8 @@ Python runs one thread at a time, and another one takes over wherever a function
 times in a Block. Threads of axes that compute at once are therefore all late, and waking a thread for each Block costs
 as much as the Block. So the thread of one axis leads: it does the steps of all axes, and the threads of the others
 wait. Between the steps it receives the datagrams, for which it would otherwise wait. The batches that arrive while an
-axis waits for its turn are one Block. `python -m bench.hall` measures it.
+axis waits for its turn are one Block. A step that other axes can have a part in ends where that part is due; it is
+computed for all axes whose turn it is, and each continues with its own result. `python -m bench.hall` measures it.
 """
 
 from __future__ import annotations
@@ -13,10 +14,11 @@ import os
 import threading
 import time
 from collections import deque
-from collections.abc import Iterator
 from contextvars import copy_context
 from math import inf
 
+from livebode.core import Responses
+from livebode.runtime.joining import Steps, WaitingSpectra, track_together
 from livebode.sources.live import receiver
 
 TICK_S = 0.1
@@ -31,7 +33,8 @@ them."""
 
 
 class Turn:
-    """The steps of one axis, each of which says whether the next one is due at once, or only when samples come.
+    """The steps of one axis, each of which says whether the next one is due at once, or only when samples come; or it
+    names the spectra whose responses it continues with, or with None to compute them itself.
 
     Parameters
     ----------
@@ -39,9 +42,12 @@ class Turn:
         They are done in any thread, but in the context in which this was created.
     """
 
-    def __init__(self, steps: Iterator[bool]) -> None:
+    def __init__(self, steps: Steps) -> None:
         self._steps, self._context = steps, copy_context()
         self.ended = False
+        self.spectra: WaitingSpectra | None = None
+        """Those with whose `responses` the step continues."""
+        self.responses: Responses | None = None
         self.error: BaseException | None = None
         """What the last step raised."""
         self.waits = self.works = self.asked_again = False
@@ -58,13 +64,20 @@ class Turn:
         _lines[0].run(self)
 
     def step(self) -> bool:
-        """Do one; whether the next one is due."""
+        """Do one, or continue it with the responses; whether the next one is due. With spectra it is not complete."""
+        responses, self.responses, self.spectra = self.responses, None, None
         try:
-            due = self._context.run(next, self._steps, None)
+            found = self._context.run(self._steps.send, responses)
+        except StopIteration:
+            self.ended = True
+            return False
         except BaseException as error:  # it belongs to the thread of this axis
-            due, self.error = None, error
-        self.ended = due is None
-        return bool(due)
+            self.ended, self.error = True, error
+            return False
+        if isinstance(found, bool):
+            return found
+        self.spectra = found
+        return False
 
 
 class _Line:
@@ -74,14 +87,17 @@ class _Line:
         self._changed = threading.Lock()
         self._all: dict[Turn, None] = {}
         self._asked: deque[Turn] = deque()
+        self._joined: list[Turn] = []  # their steps end at spectra, which wait to be tracked together
         self._leader: Turn | None = None
         self._since_s = inf  # when the leader began a step
         self._ticked_s = self._received_s = -inf
         self._waits = False  # the leader, for datagrams or a step
+        self._waiting = 0  # its thread
 
     def ask(self, turn: Turn) -> None:
         with self._changed:
-            wakes = self._append(turn) and self._waits
+            # The leader that receives what an axis waits for looks for it next, without being woken.
+            wakes = self._append(turn) and self._waits and threading.get_ident() != self._waiting
             self._waits &= not wakes
         if wakes:
             receiver().wake()
@@ -139,14 +155,39 @@ class _Line:
         """Do steps of all axes, until this one ended or another thread leads."""
         while not turn.ended and (one := self._next(turn)) is not None:
             due, until_s = one.step(), one.stepped_s + TURN_S
-            while due and time.monotonic() < until_s:
+            while (due and time.monotonic() < until_s) or (one.spectra is not None and self._is_alone):
                 due = one.step()
             with self._changed:
+                if one.spectra is not None:
+                    self._joined.append(one)
+                    continue
                 one.works = False
                 if one.ended:
                     one.called.set()
                 elif due or one.asked_again:
                     self._append(one)
+
+    @property
+    def _is_alone(self) -> bool:
+        """Whether no other axis waits, with which one could be joined."""
+        return not (self._asked or self._joined)
+
+    def _track_together(self) -> None:
+        """Compute what ended the steps of axes, which are the next ones to continue."""
+        with self._changed:
+            joined, self._joined = self._joined, []
+        found = track_together([one.spectra for one in joined if one.spectra is not None])
+        with self._changed:
+            for one, responses in zip(joined, found):
+                one.responses = responses
+            self._asked.extendleft(reversed(joined))
+
+    def _begin(self, now_s: float) -> Turn:
+        one = self._asked.popleft()
+        one.asked_again &= one.spectra is not None  # a step that continues may have been asked for again
+        one.waits, one.works, one.stepped_s = False, True, now_s
+        self._since_s = now_s
+        return one
 
     def _next(self, leader: Turn) -> Turn | None:
         """The axis that has waited longest, as soon as there is one; None if this thread does not lead any more."""
@@ -154,14 +195,18 @@ class _Line:
             with self._changed:
                 if self._leader is not leader:
                     return None
-                self._since_s = now_s = time.monotonic()
+                now_s = time.monotonic()
                 if now_s - self._ticked_s >= TICK_S:
                     self._tick(now_s)
-                if self._asked and now_s - self._received_s < RECEIVE_S:
-                    one = self._asked.popleft()
-                    one.waits, one.works, one.asked_again, one.stepped_s = False, True, False, now_s
-                    return one
-                self._since_s, self._waits = inf, not self._asked
+                received = now_s - self._received_s < RECEIVE_S
+                if self._asked and received:
+                    return self._begin(now_s)
+                joins = bool(self._joined)
+            if joins:
+                self._track_together()
+                continue
+            with self._changed:
+                self._since_s, self._waits, self._waiting = inf, not self._asked, threading.get_ident()
                 timeout_s = max(0.0, self._ticked_s + TICK_S - now_s) if self._waits else 0.0
             receiver().receive(timeout_s)
             self._received_s = time.monotonic()

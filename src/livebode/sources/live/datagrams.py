@@ -35,12 +35,12 @@ class ArrivedDatagrams:
         self._room = ctypes.create_string_buffer(BYTES_MAX)
         self._address = ctypes.create_string_buffer(_ADDRESS_BYTES)
 
-    def take(self, port: socket.socket) -> tuple[bytes, str]:
+    def take(self, port: socket.socket, *, ipv4: bool) -> tuple[bytes, str]:
         """The next datagram of a port that does not block, and the host that sent it.
 
         Raises BlockingIOError if there is none, and OSError if the port failed.
         """
-        if sys.platform != "linux" or port.family != socket.AF_INET:
+        if sys.platform != "linux" or not ipv4:
             datagram, (host, *_) = port.recvfrom(BYTES_MAX)
             return datagram, host
         size = ctypes.c_uint(_ADDRESS_BYTES)
@@ -74,6 +74,7 @@ class DatagramReceiver:
         self._selector = selectors.DefaultSelector()
         self._thread: threading.Thread | None = None
         self._failures: dict[int, Exception] = {}
+        self._ports: dict[int, bool] = {}  # whether they are of IPv4
         self._arrived = ArrivedDatagrams()
         self._received_until_s = -inf  # another thread receives until then
         self._bell: tuple[int, int] | None = None  # a pipe that `wake` writes to
@@ -85,6 +86,7 @@ class DatagramReceiver:
         number = port.fileno()
         with self._lock:
             self._selector.register(port, selectors.EVENT_READ, take)
+            self._ports[number] = port.family == socket.AF_INET
             if self._thread is None:
                 self._thread = threading.Thread(target=self._work, name="livebode datagrams", daemon=True)
                 self._thread.start()
@@ -97,6 +99,7 @@ class DatagramReceiver:
             yield check
         finally:
             with self._lock:
+                del self._ports[number]
                 if self._failures.pop(number, None) is None:
                     self._selector.unregister(port)
 
@@ -143,7 +146,7 @@ class DatagramReceiver:
                 if key.data is None:
                     self._hear(key.fd)
                 # One of each port: a sender that floods its port does not keep the others waiting.
-                elif key.fd in self._selector.get_map():
+                elif key.fd in self._ports and key.fd not in self._failures:
                     self._receive(key)
 
     def _hear(self, bell: int) -> None:
@@ -155,7 +158,7 @@ class DatagramReceiver:
     def _receive(self, key: selectors.SelectorKey) -> None:
         assert isinstance(key.fileobj, socket.socket)
         try:
-            key.data(*self._arrived.take(key.fileobj))
+            key.data(*self._arrived.take(key.fileobj, ipv4=self._ports[key.fd]))
         except BlockingIOError:  # the system dropped what it had announced, or another thread was faster
             return
         except Exception as error:  # any error: the source raises it in its own thread

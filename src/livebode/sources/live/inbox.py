@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from collections import deque
 from collections.abc import Callable
+from typing import NamedTuple
 
 from livebode.sources.live.spectra_batch import AnyBatch
 
@@ -19,6 +20,12 @@ ON_DEMAND_S_MAX = 0.1
 """Longest machine time of a sender that waits anyway: samples that are still at the sender are not lost when this
 process is killed."""
 _ENTRY_BYTES = 1000
+
+
+class _Entry(NamedTuple):
+    batch: AnyBatch
+    size_bytes: int
+    seconds: float
 
 
 class Inbox:
@@ -44,7 +51,7 @@ class Inbox:
         bytes_min: int = INBOX_BYTES_MIN,
     ) -> None:
         self._bytes_max, self._bytes_min, self._seconds_max = bytes_max, bytes_min, seconds_max
-        self._batches: deque[AnyBatch] = deque()
+        self._batches: deque[_Entry] = deque()
         self._bytes = 0
         self._seconds = 0.0
         self._changed = threading.Condition()
@@ -75,28 +82,32 @@ class Inbox:
 
     def put(self, batch: AnyBatch, wait: bool) -> bool:
         """Whether it was accepted. A full inbox rejects batches until a quarter is free, or with `wait` waits."""
+        entry = _Entry(batch, batch.nbytes + _ENTRY_BYTES, (batch.stop - batch.first_sample) / batch.rate_hz)
         with self._changed:
             if wait:
-                self._changed.wait_for(lambda: self._closed or self._has_room(batch))
-            self._full = not self._has_room(batch, RESUMES_AT if self._full else 1.0)
+                self._changed.wait_for(lambda: self._closed or self._has_room(entry))
+            self._full = not self._has_room(entry, RESUMES_AT if self._full else 1.0)
             if self._closed or self._full:
                 return False
-            self._batches.append(batch)
-            self._count(batch, 1)
+            self._batches.append(entry)
+            self._bytes += entry.size_bytes
+            self._seconds += entry.seconds
+            self._changed.notify_all()
             enough = self.has_enough
         if enough:
             self.listener()
         return True
 
-    def _has_room(self, batch: AnyBatch, share: float = 1.0) -> bool:
-        size, seconds = self._bytes + _size_bytes(batch), self._seconds + _seconds(batch)
+    def _has_room(self, entry: _Entry, share: float = 1.0) -> bool:
+        size, seconds = self._bytes + entry.size_bytes, self._seconds + entry.seconds
         short = size <= share * self._bytes_min or seconds <= share * self._seconds_max
         return size <= share * self._bytes_max and (short or not self._batches)
 
-    def _count(self, batch: AnyBatch, sign: int) -> None:
-        self._bytes += sign * _size_bytes(batch)
-        self._seconds = self._seconds + sign * _seconds(batch) if self._batches else 0.0  # no rounding error remains
-        self._changed.notify_all()
+    def _remove(self) -> AnyBatch:
+        batch, size_bytes, seconds = self._batches.popleft()
+        self._bytes -= size_bytes
+        self._seconds = self._seconds - seconds if self._batches else 0.0  # no rounding error remains
+        return batch
 
     def wait(self, timeout_s: float) -> bool:
         """Whether a batch waits, or arrived in time."""
@@ -110,19 +121,20 @@ class Inbox:
             self._changed.wait_for(lambda: self._closed or self._batches, timeout_s)
             if not self._batches:
                 return None
-            batch = self._batches.popleft()
-            self._count(batch, -1)
+            batch = self._remove()
+            self._changed.notify_all()
             return batch
 
     def get_waiting(self, samples_max: int) -> list[AnyBatch]:
         """The oldest batches that wait, with at most so many samples together, or one; none if none waits."""
         taken: list[AnyBatch] = []
         with self._changed:
-            while self._batches and (not taken or self._batches[0].samples <= samples_max):
-                batch = self._batches.popleft()
+            while self._batches and (not taken or self._batches[0].batch.samples <= samples_max):
+                batch = self._remove()
                 samples_max -= batch.samples
                 taken.append(batch)
-                self._count(batch, -1)
+            if taken:
+                self._changed.notify_all()
         return taken
 
     def close(self) -> None:
@@ -131,11 +143,3 @@ class Inbox:
             self._closed = True
             self._changed.notify_all()
         self.listener()
-
-
-def _size_bytes(batch: AnyBatch) -> int:
-    return batch.nbytes + _ENTRY_BYTES
-
-
-def _seconds(batch: AnyBatch) -> float:
-    return (batch.stop - batch.first_sample) / batch.rate_hz

@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from livebode.sources.live.batch import Batch, LiveBlock
-from livebode.sources.live.spectra_batch import AnyBatch, LiveSpectra, SpectraBatch
+from livebode.sources.live.position import Origin
+from livebode.sources.live.spectra_batch import LATER, AnyBatch, LiveSpectra, SpectraBatch
 
 
 def join_blocks(blocks: Sequence[LiveBlock]) -> list[LiveBlock]:
@@ -32,8 +33,8 @@ def block_of(batches: Sequence[AnyBatch], number: int) -> LiveBlock:
         return first.block(number, first.first_sample, False)
     if isinstance(first, Batch) and isinstance(last, Batch):
         data = np.concatenate([batch.data for batch in batches if isinstance(batch, Batch)], axis=1)
-        one = replace(first, data=data, arrived_s=last.arrived_s, mark=last.mark)
-        return one.block(number, first.first_sample, False)
+        origin = Origin(first.epoch, first.first_sample - number, last.mark)
+        return LiveBlock(data, first.channels, first.rate_hz, start=number, arrived_s=last.arrived_s, origin=origin)
     parts = [batch for batch in batches if isinstance(batch, SpectraBatch)]
     spectra = replace(
         parts[0],
@@ -58,13 +59,14 @@ def _one(part: list[LiveBlock]) -> LiveBlock:
     first, last = part[0], part[-1]
     if first is last:
         return first
-    data = np.concatenate([block.data for block in part], axis=1)
     if not isinstance(first, LiveSpectra):
+        data = np.concatenate([block.data for block in part], axis=1)
         return replace(first, data=data, arrived_s=last.arrived_s, origin=last.origin)
     spectra = [block for block in part if isinstance(block, LiveSpectra)]
     return replace(
         first,
-        data=data,
+        data=LATER,
+        values=np.concatenate([block.values for block in spectra], axis=1),
         sums=np.concatenate([block.sums for block in spectra], axis=1),
         state=np.concatenate([block.state for block in spectra]),
         arrived_s=last.arrived_s,

@@ -10,10 +10,8 @@ from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from math import inf
+from math import inf, isnan
 from typing import ClassVar, Self
-
-import numpy as np
 
 from livebode.core import Channel, Event, LivebodeError, SourceError, SpectraLayout, nearest_name
 from livebode.language import Message
@@ -31,7 +29,7 @@ from livebode.sources.live.sequencer import Sequencer
 from livebode.sources.live.settings import SourceSettings
 from livebode.sources.live.settled import SettledDeliveries
 from livebode.sources.live.source_events import SourceEvents
-from livebode.sources.live.spectra_batch import AnyBatch
+from livebode.sources.live.spectra_batch import AnyBatch, LiveSpectra
 from livebode.sources.live.unconfirmed import CONFIRMED
 from livebode.sources.quantities import DeclaredQuantities
 
@@ -109,6 +107,7 @@ class LiveSource(ABC):
         self._failure: BaseException | None = None
         self._refused: SourceError | None = None
         self._trouble: object = Message("nothing was received")
+        self._si_channels: tuple[Channel, ...] | None = None  # of the newest batch, if they are in SI units
         self._first: tuple[float, int] | None = None
         self._newest: tuple[float, float | None] | None = None
         self._received = 0
@@ -460,7 +459,9 @@ class LiveSource(ABC):
         """Add a batch to the queue; `waits`: whether its sender can wait, where it is not the same for all batches."""
         now = time.monotonic()
         self.backlog_cause.take(self.waiting_s, now)
-        batch = batch.in_si(self._quantities)
+        if batch.channels is not self._si_channels:
+            in_si = batch.in_si(self._quantities)
+            batch, self._si_channels = in_si, batch.channels if in_si is batch else None
         self._pauses.reset()
         latency = None
         if batch.stamp_s is not None:
@@ -468,7 +469,7 @@ class LiveSource(ABC):
         self._newest = (now, latency)
         self._received += batch.samples
         self._first = self._first or (now, self._received)
-        if np.isnan(batch.arrived_s):
+        if isnan(batch.arrived_s):
             batch = replace(batch, arrived_s=now)
         if self._inbox.put(batch, self.waits if waits is None else waits):
             self._dropped.finish()
@@ -484,4 +485,6 @@ def channel_unknown(name: str, names: list[str]) -> SourceError:
 
 
 def _rows(block: LiveBlock, rows: list[int], channels: tuple[Channel, ...]) -> LiveBlock:
+    if isinstance(block, LiveSpectra):
+        return block.of_channels(channels)
     return replace(block, data=block.data[rows], channels=channels)

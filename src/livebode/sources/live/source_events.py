@@ -101,6 +101,8 @@ class SourceEvents:
 
     def take(self) -> list[Event]:
         """Events since the last call."""
+        if not self._events:
+            return []
         with self._lock:
             events, self._events = self._events, []
         return events

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from math import nan
 
 import numpy as np
@@ -13,10 +14,47 @@ from livebode.sources.live.batch import VALUES_MAX, Batch, LiveBlock, check_numb
 from livebode.sources.live.position import Mark, Origin
 from livebode.sources.quantities import DeclaredQuantities, in_si
 
+LATER: NDArray[np.float64] = np.zeros((0, 0))
+"""In place of the data of LiveSpectra: they are computed when they are read."""
+
 
 @dataclass(frozen=True, eq=False)
 class LiveSpectra(Spectra, LiveBlock):
-    """Spectra from a live source; `arrived_s` as in `LiveBlock`."""
+    """Spectra from a live source; `arrived_s` as in `LiveBlock`.
+
+    Parameters
+    ----------
+    values
+        Of the value channels of the layout, shape (values, spectra); with `LATER` as data, which nearly nobody reads.
+    """
+
+    values: NDArray[np.float64] = field(kw_only=True)
+
+    def __post_init__(self) -> None:
+        if self.__dict__["data"] is LATER:  # what it is made from was checked as a batch
+            del self.__dict__["data"]
+        else:
+            super().__post_init__()
+
+    @cached_property  # type: ignore[misc]  # a field that is computed late
+    def data(self) -> NDArray[np.float64]:
+        sums = dict(zip((channel.name for channel in self.layout.signals), self.sums))
+        values = dict(zip((channel.name for channel in self.layout.values), self.values))
+        data = np.array([values[n] if n in values else rms(sums[n], self.layout) for n in self.names])
+        data.flags.writeable = False
+        return data
+
+    def cut(self, first: int, last: int) -> LiveSpectra:
+        part = super().cut(first, last)
+        assert isinstance(part, LiveSpectra)
+        return part if part is self else replace(part, values=self.values[:, first:last])
+
+    def of_channels(self, channels: tuple[Channel, ...]) -> LiveSpectra:
+        """The same with the data of these channels, of the layout's."""
+        part = object.__new__(LiveSpectra)  # `replace` takes longer than all else of a spectrum
+        part.__dict__.update(self.__dict__, channels=channels)
+        part.__dict__.pop("data", None)
+        return part
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,20 +152,16 @@ class SpectraBatch:
     def block(self, number: int, start: int, gap: bool) -> LiveSpectra:
         """Spectra from sample `start` of the sender, which gets the number `number`."""
         skipped = (start - self.first_sample) // self.layout.hop
-        layout, sums = self.layout, self.sums[:, skipped:]
-        data = rms(sums, layout)
-        if layout.values:
-            shown = dict(zip((c.name for c in layout.signals), data))
-            shown |= dict(zip((c.name for c in layout.values), self.values[:, skipped:]))
-            data = np.stack([shown[channel.name] for channel in self.channels])
+        layout = self.layout
         return LiveSpectra(
-            data,
+            LATER,
             self.channels,
             self.rate_hz,
             start=number,
             gap=gap,
             layout=layout,
-            sums=sums,
+            sums=self.sums[:, skipped:],
+            values=self.values[:, skipped:],
             state=self.state[skipped:],
             place=(start + layout.hop) % layout.window,
             arrived_s=self.arrived_s,

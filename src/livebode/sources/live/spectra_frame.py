@@ -148,16 +148,16 @@ def read_spectra(header: Header, payload: bytes | memoryview, layout: SpectraLay
         raise inconsistent_frame(
             f"a frame of spectra has {header.channels} channels, its layout {count}", channels=[header.channels, count]
         )
-    dtype = payload_type(layout, double=bool(header.flags & FLOAT64))
-    if not header.samples or len(payload) != header.samples * dtype.itemsize:
+    double = bool(header.flags & FLOAT64)
+    itemsize = _size_bytes(layout, double=double)
+    if not header.samples or len(payload) != header.samples * itemsize:
         raise inconsistent_frame(
-            f"a frame of {header.samples} spectra of {dtype.itemsize} bytes each has {len(payload)} bytes of them",
+            f"a frame of {header.samples} spectra of {itemsize} bytes each has {len(payload)} bytes of them",
             spectra=header.samples,
             bytes=len(payload),
         )
-    sums, values, states = read_rows(payload, layout, double=bool(header.flags & FLOAT64))
-    if np.any(states > _STATES):
-        state = int(states.max())
+    sums, values, states = (read_row if header.samples == 1 else read_rows)(payload, layout, double=double)
+    if (state := int(states.max())) > _STATES:
         raise SourceError(
             "value-invalid",
             f"a spectrum has the state {state}, not 0 to {_STATES}",
@@ -180,6 +180,22 @@ def read_rows(
         sums = rows["sums"].astype(np.float64)
         values = rows["values"].T.astype(np.float64, order="C")
     return complex_of(sums), values, np.array(rows["state"])
+
+
+def read_row(
+    payload: bytes | memoryview, layout: SpectraLayout, *, double: bool
+) -> tuple[NDArray[np.complex128], NDArray[np.float64], NDArray[np.uint32]]:
+    """The same for a single spectrum, in less time."""
+    real, pair = ("<f8", "<c16") if double else ("<f4", "<c8")
+    states, values = np.array(np.frombuffer(payload, "<u4", 1)), np.frombuffer(payload, real, len(layout.values), 4)
+    sums = np.frombuffer(payload, pair, offset=4 + values.nbytes).reshape(len(layout.signals), 1, -1)
+    with np.errstate(invalid="ignore"):  # as above
+        return sums.astype(np.complex128), values.astype(np.float64)[:, np.newaxis], states
+
+
+def _size_bytes(layout: SpectraLayout, *, double: bool) -> int:
+    """Bytes of one spectrum in a payload."""
+    return 4 + (8 if double else 4) * (len(layout.values) + 2 * len(layout.signals) * len(layout.bins))
 
 
 def stamp_of(stamp_ns: int, hop: int, rate_hz: float) -> float | None:
