@@ -142,10 +142,8 @@ def test_inspect_describes_the_excitation(log: Path) -> None:
     # Amplitude 2 at the output against noise 0.01·√(1 + 2²) rms: 10·log10(2²/2 / (2σ²/20)).
     assert excitation["snr_db"] == pytest.approx([10 * np.log10(2 / (2 * 5e-4 / 20))] * 3, abs=2)
     text = livebode("inspect", log, "--excitation", "w", "--output", "y").out
-    assert (
-        "a run has by default 200 (hop 5) responses per second, of a machine that moves 1000 (hop 1), a live run 50 (hop 20)"
-        in text
-    )
+    of_recordings = "a run has by default 200 (hop 5) responses per second, of a machine that moves 1000 (hop 1)"
+    assert f"{of_recordings}, a live run 50 (hop 20)" in text
     assert "repeats every 20 samples" in text
 
 

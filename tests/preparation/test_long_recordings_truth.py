@@ -1,4 +1,4 @@
-"""The run of a recording is small, more so of a long one, which it reports, and has the same mean; and on request all."""
+"""The run of a recording is small, more so of a long one, and has the same mean; the full rate is there on request."""
 
 from __future__ import annotations
 
