@@ -76,7 +76,7 @@ def _difference(samples: np.ndarray, lag: int, ahead: int) -> float:
 
 
 RECORDED_VALUES_MAX = 1 << 19
-"""Responses × lines that a recording has by default, about 30 MB of its run."""
+"""Responses × lines that a recording has by default, about 19 MB of its run."""
 
 
 def recorded_hop(axis: Axis, log: Log, lines: Lines) -> int | None:
