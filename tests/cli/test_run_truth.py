@@ -14,6 +14,7 @@ import pytest
 from livebode.core import Block
 from livebode.estimation import Settings, Tracker
 from tests.support.command import LINES, RATE_HZ, livebode, signals, write_csv, write_parquet
+from tests.support.responses import as_recorded
 
 JOINT = ("--excitation", "w", "--input", "u", "--output", "y")
 
@@ -33,7 +34,8 @@ def test_the_run_directory_holds_what_the_tracker_gives(log: Path, tmp_path: Pat
     ]  # fmt: skip
     columns = signals()
     block = Block(np.array([columns[n] for n in "wuyt"]), tuple("wuyt"), RATE_HZ)
-    expected = Tracker(Settings(lines=LINES, output="y", input="u", excitation="w", schedule="t", hop=7)).process(block)
+    settings = Settings(lines=LINES, output="y", input="u", excitation="w", schedule="t", hop=7)
+    expected = as_recorded(Tracker(settings).process(block))
     table = pq.read_table(out / "responses.parquet").to_pydict()
     shape = expected.value.shape
     for name, values in {
