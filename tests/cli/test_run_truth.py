@@ -14,6 +14,7 @@ import pytest
 from livebode.core import Block
 from livebode.estimation import Settings, Tracker
 from tests.support.command import LINES, RATE_HZ, livebode, signals, write_csv, write_parquet
+from tests.support.responses import as_recorded
 
 JOINT = ("--excitation", "w", "--input", "u", "--output", "y")
 
@@ -33,7 +34,8 @@ def test_the_run_directory_holds_what_the_tracker_gives(log: Path, tmp_path: Pat
     ]  # fmt: skip
     columns = signals()
     block = Block(np.array([columns[n] for n in "wuyt"]), tuple("wuyt"), RATE_HZ)
-    expected = Tracker(Settings(lines=LINES, output="y", input="u", excitation="w", schedule="t", hop=7)).process(block)
+    settings = Settings(lines=LINES, output="y", input="u", excitation="w", schedule="t", hop=7)
+    expected = as_recorded(Tracker(settings).process(block))
     table = pq.read_table(out / "responses.parquet").to_pydict()
     shape = expected.value.shape
     for name, values in {
@@ -142,7 +144,8 @@ def test_inspect_describes_the_excitation(log: Path) -> None:
     # Amplitude 2 at the output against noise 0.01·√(1 + 2²) rms: 10·log10(2²/2 / (2σ²/20)).
     assert excitation["snr_db"] == pytest.approx([10 * np.log10(2 / (2 * 5e-4 / 20))] * 3, abs=2)
     text = livebode("inspect", log, "--excitation", "w", "--output", "y").out
-    assert "a run has 1000 responses per second (hop 1) by default, a live run 50 (hop 20)" in text
+    of_recordings = "a run has by default 200 (hop 5) responses per second, of a machine that moves 1000 (hop 1)"
+    assert f"{of_recordings}, a live run 50 (hop 20)" in text
     assert "repeats every 20 samples" in text
 
 

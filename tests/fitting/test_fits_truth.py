@@ -233,7 +233,7 @@ def test_the_mean_of_responses_has_the_scatter_of_independent_windows() -> None:
     signals = {"lines": LINES, "output": "velocity", "input": "u", "excitation": "w"}
     one = mean_response(Tracker(Settings(**signals, hop=20)).process(block))
     truth = axis.linear(0.8).sampled(4000.0).response(LINES.frequency_hz)
-    assert one.dof[0] == pytest.approx(39, abs=2)
+    assert one.dof[0] == pytest.approx(1.5 * 39, abs=2)  # of windows that overlap; tests of the mean have the theory
     apart = np.abs(one.value[0] - truth) / one.sigma[0]
     assert np.sqrt(np.mean(apart**2)) < 1.8
     with refused(SignalError, "no-valid-response"):

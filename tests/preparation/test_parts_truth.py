@@ -40,7 +40,7 @@ ROLES_OF_RUN = {"excitation": "w", "input": "u", "output": "y"}
 def ran(log: Path, out: Path, roles: dict[str, str] = ROLES_OF_RUN, **part: object) -> RunRecord:
     """Without pictures, which take most of the time."""
     lines = {"frequencies": "50,100,200", "window": WINDOW}
-    tracking = {"all_periods": not part, "accept_roles": True}
+    tracking = {"all_periods": not part, "accept_roles": True, "hop": 5}
     axis = Axis.of({"source": {"log": log} | part, "signals": roles, "lines": lines, "tracking": tracking}, "the test")
     run(axis, Destination(out, lambda *_: None))
     return RunRecord.open(out)

@@ -35,6 +35,7 @@ from tests.support.recorded import (
     record_machine,
     same,
 )  # fmt: skip
+from tests.support.responses import as_recorded
 from tests.support.runs import record
 
 SAMPLES = 4000
@@ -67,7 +68,7 @@ def test_segments_and_one_piece_hold_the_same(tmp_path: Path) -> None:
     record(machine(SAMPLES), Tracker(SETTINGS), tmp_path / "piece", about={})
     check_whole(tmp_path / "segments", SAMPLES)
     runs = [RunRecord.open(tmp_path / name) for name in ("segments", "piece")]
-    assert same(runs[0].responses(), runs[1].responses())
+    assert same(as_recorded(runs[0].responses()), runs[1].responses())
     assert runs[0].events() == runs[1].events()
     assert each(runs[0]) == list(expected(SAMPLES)[1])
     assert runs[0].summary["counts"] == runs[1].summary["counts"]
@@ -223,7 +224,7 @@ def test_the_same_command_continues_where_it_was_ended(
     assert run.responses().sample[-1] > 16_000 - RATE_HZ
     assert livebode("run", *given, pictures=True).code == 0
     whole = Path(str(given[0])).with_name("whole")
-    assert same(RunRecord.open(tmp_path / "run").responses(), RunRecord.open(whole).responses())
+    assert same(as_recorded(RunRecord.open(tmp_path / "run").responses()), RunRecord.open(whole).responses())
     assert (tmp_path / "run" / "bode.png").stat().st_size > 10_000
     assert "is finished" in livebode("run", *given).err
     assert livebode("run", *given, "--force").code == 0

@@ -14,6 +14,7 @@ from livebode.records import RunRecord
 from livebode.records.summary_file import to_document
 from tests.support.command import RATE_HZ, livebode, signals, write_parquet
 from tests.support.errors import refused
+from tests.support.responses import as_recorded
 
 
 @pytest.fixture
@@ -33,7 +34,8 @@ def test_responses_come_back_exactly(run: Path, rows: int, monkeypatch: pytest.M
     columns["y"][700] = np.nan
     lines = Lines.parse("50,100,200", RATE_HZ, 100)
     block = Block(np.array([columns[n] for n in "wuyt"]), tuple("wuyt"), RATE_HZ)
-    expected = Tracker(Settings(lines=lines, output="y", input="u", excitation="w", schedule="t", hop=1)).process(block)
+    settings = Settings(lines=lines, output="y", input="u", excitation="w", schedule="t", hop=1)
+    expected = as_recorded(Tracker(settings).process(block))
     read = RunRecord.open(run)
     assert read.lines == lines
     found = read.responses()

@@ -51,6 +51,6 @@ def test_the_error_of_a_group_is_raised_by_the_next_call(tmp_path: Path, monkeyp
     other = Table.of({"sample": np.arange(10.0)})
     file = TableFile(tmp_path / "responses.parquet", TABLE)
     file.write(other)
-    with pytest.raises(ValueError, match="schema"):
+    with pytest.raises(ValueError, match="columns"):
         file.write(rows(0, 10))
     file.close()

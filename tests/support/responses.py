@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -11,6 +12,13 @@ from livebode.core import Lines, Responses
 
 ARRAYS = ("value", "sigma", "dof", "coherence", "valid", "first", "sample", "time_s", "schedule")
 UNITS = ("", "rad/s/A", "µm/(N m)", 'a,b "c"')
+
+
+def as_recorded(responses: Responses) -> Responses:
+    """The responses as the run of a recording has them: what describes their accuracy has 7 digits."""
+    names = "sigma", "coherence", "input_coherence", "distortion"
+    rounded = {name: getattr(responses, name).astype(np.float32).astype(np.float64) for name in names}
+    return replace(responses, **rounded, weight=responses.weight.astype(np.complex64).astype(np.complex128))
 
 
 def made(

@@ -281,7 +281,7 @@ def _show_stretches(found: Inspection, console: Console) -> None:
 def _show_excitation(found: Inspection, console: Console) -> None:
     from rich.table import Table
 
-    from livebode.estimation import default_hop
+    from livebode.estimation import default_hop, quarter_hop
     from livebode.excitation import pattern
 
     excitation = found.excitation
@@ -310,10 +310,12 @@ def _show_excitation(found: Inspection, console: Console) -> None:
         f"{counted(len(lines), 'line')} ({pattern(lines.bins)}), "
         f"{lines.frequency_hz[0]:.6g} … {lines.frequency_hz[-1]:.6g} Hz"
     )
-    hop, live = default_hop(excitation.period), found.live_hop
+    hops = [f"{lines.rate_hz / hop:.4g} (hop {hop})" for hop in (
+        quarter_hop(excitation.period), default_hop(excitation.period), found.live_hop
+    )]  # fmt: skip
     console.print(
-        f"with this period as window, a run has {lines.rate_hz / hop:.4g} responses per second (hop {hop}) by default, "
-        f"a live run {lines.rate_hz / live:.4g} (hop {live})",
+        f"with this period as window, a run has by default {hops[0]} responses per second, of a machine that moves "
+        f"{hops[1]}, a live run {hops[2]}",
         soft_wrap=True,
     )
     table = Table(box=None, header_style="bold")

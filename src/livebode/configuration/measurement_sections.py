@@ -196,8 +196,9 @@ class TrackingSection(ConfigurationSection):
         The response that is estimated: "plant", "open loop", "closed loop" or "sensitivity". All but "plant" use the
         controllers in [loop]; without them, their action in the recorded signals, which "direct" cannot.
     hop
-        Samples between responses. Default: for a recording a twentieth of the window, for a live source 20 responses
-        per second; the nearest divisor of the window. A long recording at standstill has fewer: about 500,000 values.
+        Samples between responses. Default: for a recording a quarter of the window, with a schedule, [motion], a
+        baseline or a ready signal a twentieth; for a live source 20 responses per second; a divisor of the window. A
+        long recording at standstill has fewer: about 500,000 values.
     average
         Average over the previous periods, weighted by forgetting, instead of using only the newest window.
     forgetting

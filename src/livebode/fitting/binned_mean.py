@@ -136,13 +136,15 @@ def binned_means(responses: Responses, bin_s: float, shared: SharedWindows | Non
         value = np.add.reduceat(known * weight, starts, axis=0) / sums
         error = np.where(used, (known - value[bins]) * weight, 0.0)
         scatter = np.add.reduceat(np.abs(error) ** 2, starts, axis=0)
-        windows = count**2 / _overlaps(responses, used, starts, bins, shared or SharedWindows(responses.lines.window))
+        overlaps = _overlaps(responses, used, starts, bins, shared or SharedWindows(responses.lines.window))
+        windows = count**2 / overlaps[0]
+        free = (windows - 1) * overlaps[0] / overlaps[1]
         of_scatter = np.sqrt(scatter * count / (windows - 1)) / np.abs(sums)
         single, single_dof = _of_single(responses, used, starts)
     several = windows >= 2
     distortion = _newest_known(np.where(used, responses.distortion, np.nan), starts)
     noise = np.where(several, of_scatter, single)
-    sigma, dof = _with_distortion(noise, np.where(several, windows - 1, single_dof[:, np.newaxis]), distortion, several)
+    sigma, dof = _with_distortion(noise, np.where(several, free, single_dof[:, np.newaxis]), distortion, several)
     means = _reduced(responses, starts, value, used)
     means = replace(
         means, sigma=sigma, dof=dof, distortion=distortion, ready=ready,
@@ -210,16 +212,18 @@ def _starts(time_s: Floats, bin_s: float) -> Starts:
 def _overlaps(
     responses: Responses, used: NDArray[np.bool_], starts: Starts, bins: NDArray[Any], shared: SharedWindows
 ) -> Floats:
-    """Σᵢⱼ of the correlations of the pairs of responses of each span."""
+    """Σᵢⱼ of the correlations of the pairs of responses of each span, and of their squares, (2, spans, lines)."""
     sample = responses.sample
-    total = used.astype(np.float64)
+    total = np.stack([used.astype(np.float64)] * 2)
     for lag in range(1, len(responses)):
         apart = sample[lag:] - sample[:-lag]
         if not (apart < shared.reach).any():
             break
         share = np.where(bins[lag:] == bins[:-lag], shared.share(apart), 0.0)
-        total[lag:] += 2 * share[:, np.newaxis] * (used[lag:] & used[:-lag])
-    return np.asarray(np.add.reduceat(total, starts, axis=0))
+        both = used[lag:] & used[:-lag]
+        total[0, lag:] += 2 * share[:, np.newaxis] * both
+        total[1, lag:] += 2 * share[:, np.newaxis] ** 2 * both
+    return np.asarray(np.add.reduceat(total, starts, axis=1))
 
 
 def _of_single(responses: Responses, used: NDArray[np.bool_], starts: Starts) -> tuple[Floats, Floats]:

@@ -67,9 +67,10 @@ def mean_response(responses: Responses | Iterable[Responses]) -> Responses:
 
         sigma² = Σᵢ |eᵢ|² / n / (m − 1),
 
-    without bias, also if the noise increases or decreases. It has m − 1 degrees of freedom, a conservative choice: the
-    scatter of overlapping windows contains slightly more information. With fewer than two such windows sigma is the
-    least known one of the responses.
+    without bias, also if the noise increases or decreases. The scatter of windows that overlap contains more
+    information than that of m windows: sigma has (m − 1)·Σᵢⱼ ρᵢⱼ / Σᵢⱼ ρᵢⱼ² degrees of freedom, by the first
+    two moments of a quadratic form (F. E. Satterthwaite, Biometrics Bull. 2, 1946); m − 1 without overlap. With fewer
+    than two such windows sigma is the least known one of the responses.
 
     The sigmas of single responses scatter and lag, so that weights of 1/sigma² would prefer windows that have just
     become noisy. For the same reason the bound of the mean is not computed from them. Errors that repeat do not average
@@ -199,28 +200,30 @@ class RunningMean:
         if self.averages:
             of_noise = np.sqrt(np.maximum(response.sigma**2 - np.nan_to_num(response.distortion, posinf=0.0) ** 2, 0.0))
             return replace(response, sigma=of_noise), response.weight
-        scatter, windows = self._scatter(response.valid)
+        scatter, windows, free = self._scatter(response.valid)
         several = windows >= 2
-        dof = float(np.min(windows - 1, where=several, initial=np.inf))
+        dof = float(np.min(free, where=several, initial=np.inf))
         return replace(response, sigma=np.where(several, scatter, np.nan), dof=dof), self._pair.denominator
 
-    def _scatter(self, valid: NDArray[np.bool_]) -> tuple[Floats, Floats]:
-        """Standard deviation of the mean by the scatter of the responses, and the number of windows without overlap."""
-        pair = self._pair
+    def _scatter(self, valid: NDArray[np.bool_]) -> tuple[Floats, Floats, Floats]:
+        """Standard deviation of the mean by the scatter of the responses, the number of windows without overlap, and
+        the degrees of freedom."""
+        pair, shared = self._pair, self._overlap
         count = np.where(valid, pair.count, np.nan)
         with np.errstate(invalid="ignore", divide="ignore"):
-            windows = count**2 / self._overlap.total()
-            return np.sqrt(pair.unexplained() / count / (windows - 1)) / np.abs(pair.denominator), windows
+            windows = count**2 / shared.sums[0]
+            scatter = np.sqrt(pair.unexplained() / count / (windows - 1)) / np.abs(pair.denominator)
+            return scatter, windows, (windows - 1) * shared.sums[0] / shared.sums[1]
 
     def _mean_of_all(self, newest: Responses, distortion: Floats, valid: NDArray[np.bool_]) -> Responses:
-        scatter, windows = self._scatter(valid)
+        scatter, windows, free = self._scatter(valid)
         with np.errstate(invalid="ignore", divide="ignore"):
             value = self._pair.numerator / self._pair.denominator
         several = windows >= 2
         single = np.where(np.isfinite(self._least), self._least, np.nan)
         added = np.where(np.isfinite(distortion) & valid, distortion, 0.0)
         together = np.hypot(np.hypot(scatter, added), self.drift.result().spread)
-        dof = windows[several].min() - 1 if several.any() else self._dof or np.nan
+        dof = free[several].min() if several.any() else self._dof or np.nan
         if several.any() and added.any():
             with np.errstate(invalid="ignore", divide="ignore"):
                 of_line = together**4 / (scatter**4 / dof + added**4 / _DISTORTION_DOF)
@@ -307,34 +310,41 @@ class _Pair:
         return np.asarray(np.maximum(self._scatter[0] - shared + np.abs(ratio) ** 2 * self._scatter[1], 0.0))
 
 
+_TOGETHER = 1 << 12  # windows, so that the sums of the squares of their places are exact to rounding
+
+
 class _Overlap:
-    """Σᵢⱼ max(0, 1 − dᵢⱼ/N) = Σₜ C(t)²/N, C(t) the number of windows with sample t; windows are added in order."""
+    """Sums over all pairs of windows, which are added in order, of what their noise has in common.
+
+    Attributes
+    ----------
+    sums
+        Σᵢⱼ ρᵢⱼ and Σᵢⱼ ρᵢⱼ² with ρᵢⱼ = max(0, 1 − dᵢⱼ/N), (2, lines).
+    """
 
     def __init__(self, window: int, lines: int) -> None:
         self._window = window
-        self._stop = np.empty(0, dtype=np.int64)
+        self._stop = np.empty(0, dtype=np.int64)  # of the windows that later ones may overlap
         self._used = np.empty((0, lines))
-        self._done: int | None = None
-        self._sum = np.zeros(lines)
+        self.sums = np.zeros((2, lines))
 
     def add(self, stop: NDArray[np.int64], used: Floats) -> None:
-        self._stop = np.concatenate([self._stop, stop])
-        self._used = np.concatenate([self._used, used])
-        self._advance(int(self._stop[-1]) - self._window)  # no later window begins before that
+        for begin in range(0, len(stop), _TOGETHER):
+            self._add(stop[begin : begin + _TOGETHER], used[begin : begin + _TOGETHER])
 
-    def total(self) -> Floats:
-        if self._stop.size:
-            self._advance(int(self._stop[-1]))
-        return self._sum
-
-    def _advance(self, until: int) -> None:
-        start = int(self._stop[0]) - self._window if self._done is None else self._done
-        edges = np.concatenate([self._stop - self._window, self._stop]).clip(start, until)
-        order = np.argsort(edges, kind="stable")
-        covering = np.cumsum(np.concatenate([self._used, -self._used])[order], axis=0)[:-1]
-        self._sum += (covering**2 * np.diff(edges[order])[:, np.newaxis]).sum(axis=0) / self._window
-        self._done = until
-        still = self._stop > until
+    def _add(self, stop: NDArray[np.int64], used: Floats) -> None:
+        before = len(self._stop)
+        self._stop, self._used = np.concatenate([self._stop, stop]), np.concatenate([self._used, used])
+        place = (self._stop - self._stop[0])[:, np.newaxis].astype(np.float64)
+        upto = np.cumsum(self._used * np.stack([np.ones_like(place), place, place**2]), axis=1)
+        upto = np.concatenate([np.zeros_like(upto[:, :1]), upto], axis=1)
+        # Of each new window, over the earlier ones that overlap it, with a + place their samples in common.
+        first = np.searchsorted(self._stop, stop - self._window, side="right")
+        count, places, squares = upto[:, before : before + len(stop)] - upto[:, first]
+        a = self._window - place[before:]
+        shared = (a * count + places) / self._window, (a**2 * count + 2 * a * places + squares) / self._window**2
+        self.sums += [(used * (1 + 2 * each)).sum(axis=0) for each in shared]
+        still = self._stop > self._stop[-1] - self._window
         self._stop, self._used = self._stop[still], self._used[still]
 
 

@@ -171,7 +171,7 @@ def track(
     *signals, fs, lines, window, estimator, accept_roles
         As of `frf`; one output.
     hop
-        Samples between responses; default: a twentieth of the window.
+        Samples between responses; default: a quarter of the window, as of a run.
 
     Returns
     -------
@@ -190,7 +190,7 @@ def track(
     >>> block, _ = livebode.example_axis().run()
     >>> responses = track(block["w"], block["u"], block["velocity"], fs=4000)
     >>> responses.value.shape, responses.time_s[[0, -1]].round(2)
-    ((200, 13), array([-0.05,  0.95]))
+    ((40, 13), array([-0.03,  0.95]))
     """
     given, outputs = _roles("track", signals)
     if isinstance(outputs, list):

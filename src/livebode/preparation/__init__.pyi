@@ -32,6 +32,7 @@ from livebode.preparation.part import configured_part as configured_part
 from livebode.preparation.part import motion_part as motion_part
 from livebode.preparation.plan import beginnings as beginnings
 from livebode.preparation.plan import hop_event as hop_event
+from livebode.preparation.plan import is_timed as is_timed
 from livebode.preparation.plan import roles_in_doubt as roles_in_doubt
 from livebode.preparation.plan import window_in_doubt as window_in_doubt
 from livebode.preparation.proposal import Guess as Guess

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from livebode.configuration import Axis
 from livebode.core import ConfigError, Lines, SignalError
-from livebode.estimation import WINDOW_MIN, WINDOWS, LocalPolynomial, Settings, separable
+from livebode.estimation import WINDOW_MIN, WINDOWS, LocalPolynomial, Settings, quarter_hop, separable
 from livebode.preparation.checks import check_length
-from livebode.preparation.plan import SEARCHED, joined, settings_of
+from livebode.preparation.plan import SEARCHED, is_timed, joined, settings_of
 from livebode.sources import Log
 
 LINES_MAX = 1000
@@ -29,8 +29,10 @@ def nonperiodic_settings(axis: Axis, log: Log) -> Settings:
     hop = None
     if window != "auto":
         check_length(log.samples, windows * window)
+        if windows == 1 and not is_timed(axis):
+            hop = axis.tracking.hop or quarter_hop(window)
     if frequencies != "auto" and window != "auto":
-        return settings_of(axis, log.rate_hz, Lines.parse(frequencies, log.rate_hz, window, rounded=True))
+        return settings_of(axis, log.rate_hz, Lines.parse(frequencies, log.rate_hz, window, rounded=True), hop)
     signals = axis.signals
     reference = signals.input if signals.excitation is None else signals.excitation
     if reference is None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from livebode.configuration import Axis
 from livebode.core import ANY_EXCITATION, Block, ConfigError, Event, Lines
-from livebode.estimation import FORGETTING, RippleOrder, Settings, default_hop, divisors
+from livebode.estimation import FORGETTING, RippleOrder, Settings, divisors, quarter_hop
 from livebode.language import Message
 from livebode.preparation.checks import check_length
 from livebode.preparation.roles import ROLES, check_distinct, check_roles, period_of
@@ -76,28 +76,32 @@ def _difference(samples: np.ndarray, lag: int, ahead: int) -> float:
 
 
 RECORDED_VALUES_MAX = 1 << 19
-"""Responses × lines that a recording has by default, about 30 MB of its run."""
+"""Responses × lines that a recording has by default, about 19 MB of its run."""
 
 
 def recorded_hop(axis: Axis, log: Log, lines: Lines) -> int | None:
-    """Hop of a recording so long that a twentieth of the window would give more than `RECORDED_VALUES_MAX`; else None.
+    """Hop of a recording unless it is specified: a quarter of the window; longer above `RECORDED_VALUES_MAX`.
 
     It divides the window, and is the window at most, so that every sample counts. A machine that moves, or whose
-    changes are timed, has the usual hop.
+    changes are timed, has a twentieth of the window: None.
     """
-    timed = axis.signals.schedule or axis.motion or axis.monitoring.baseline or axis.signals.ready
-    if axis.tracking.hop or timed or log.samples is None:
+    if axis.tracking.hop or is_timed(axis):
         return None
-    least = log.samples * len(lines) / RECORDED_VALUES_MAX
-    if least <= default_hop(lines.window):
-        return None
+    usual, least = quarter_hop(lines.window), (log.samples or 0) * len(lines) / RECORDED_VALUES_MAX
+    if least <= usual:
+        return usual
     return next((hop for hop in divisors(lines.window) if hop >= least), lines.window)
+
+
+def is_timed(axis: Axis) -> bool:
+    """Whether the moment of a response counts: of a machine that moves, or whose changes are timed."""
+    return bool(axis.signals.schedule or axis.motion or axis.monitoring.baseline or axis.signals.ready)
 
 
 def hop_event(axis: Axis, log: Log, settings: Settings) -> list[Event]:
     """An event if the hop is that of a long recording."""
-    usual = default_hop(settings.lines.window)
-    if settings.step != recorded_hop(axis, log, settings.lines):
+    usual = quarter_hop(settings.lines.window)
+    if settings.step <= usual or settings.step != recorded_hop(axis, log, settings.lines):
         return []
     message = Message(
         "the recording is long: it has a response every {hop} samples, so that the run is small; --hop {usual} gives "

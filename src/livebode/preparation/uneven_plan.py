@@ -7,14 +7,15 @@ from dataclasses import replace
 
 from livebode.configuration import Axis
 from livebode.core import ConfigError, Event, Lines
-from livebode.estimation import Settings
+from livebode.estimation import Settings, divisors
 from livebode.language import Message
 from livebode.preparation._uneven_grid import PLACES
-from livebode.preparation.plan import settings_of
+from livebode.preparation.plan import is_timed, settings_of
 from livebode.sources import UnevenLog
 
+_PLACES_UNTIMED = 4
 _UNKNOWNS = 300
-"""Amplitudes of a window up to which the default hop is that of even samples; the cost of a fit is their cube."""
+"""Amplitudes of a window up to which a machine that moves has the hop of even samples; a fit costs their cube."""
 
 
 def check_uneven(axis: Axis) -> None:
@@ -47,7 +48,7 @@ def uneven_settings(axis: Axis, lines: Lines) -> Settings:
 
     A differenced channel is fitted with a linear trend instead, which its spectra no longer contain.
     """
-    hop = axis.tracking.hop or _default_hop(lines)
+    hop = axis.tracking.hop or _default_hop(lines, PLACES if is_timed(axis) else _PLACES_UNTIMED)
     settings = settings_of(axis, lines.rate_hz, lines, hop)
     if settings.step < lines.window and lines.window % settings.step:
         raise ConfigError(
@@ -62,12 +63,11 @@ def uneven_settings(axis: Axis, lines: Lines) -> Settings:
     return replace(settings, differenced=())
 
 
-def _default_hop(lines: Lines) -> int:
-    """The divisor of the window nearest to a twentieth of it, or longer where a window has many lines."""
+def _default_hop(lines: Lines, places_max: int) -> int:
+    """The divisor of the window nearest to its part of so many, or longer where a window has many lines."""
     window, unknowns = lines.window, 2 * len(lines) + 1
-    places = max(1.0, PLACES * min(1.0, (_UNKNOWNS / unknowns) ** 3))
-    divisors = [d for d in range(1, window + 1) if window % d == 0]
-    return min(divisors, key=lambda d: max(d * places / window, window / (d * places)))
+    places = max(1.0, min(places_max, PLACES * (_UNKNOWNS / unknowns) ** 3))
+    return min(divisors(window), key=lambda d: max(d * places / window, window / (d * places)))
 
 
 def uneven_event(log: UnevenLog, channels: Sequence[str], lines: Lines) -> Event:

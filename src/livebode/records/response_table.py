@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from livebode.core import PER_LINE, PER_RESPONSE, Lines, Parameters, Responses
 from livebode.records.column_table import ColumnTable
@@ -33,7 +34,12 @@ RESPONSE_SCHEMA = Schema.of(
 response, sigma with its degrees of freedom, coherence of excitation and output, validity, coherence of excitation and
 input, weight in a mean, distortion, whether the machine was ready in the whole window. NaN for missing values."""
 
-RESPONSES = ColumnTable(RESPONSE_SCHEMA, ("first", "sample", "time_s", "schedule", "frequency_hz", "dof"))
+RESPONSES = ColumnTable(
+    RESPONSE_SCHEMA,
+    ("first", "sample", "time_s", "schedule", "frequency_hz", "dof"),
+    # Of what describes the accuracy: a sigma from m periods is known to 1/(2·√m).
+    ("sigma", "coherence", "input_coherence", "weight_re", "weight_im", "distortion"),
+)
 
 
 def as_batch(responses: Responses) -> Table:
@@ -60,10 +66,15 @@ def as_batch(responses: Responses) -> Table:
     return Table(RESPONSE_SCHEMA, tuple(columns))
 
 
+def _widened(column: NDArray[Any]) -> NDArray[Any]:
+    """Doubles, where the table has rounded numbers."""
+    return column.astype(np.float64) if column.dtype == np.float32 else column
+
+
 def responses_in(table: Table, lines: Lines, found: Mapping[str, Any]) -> Responses:
     """The responses in complete rows of this table; `found` of run.json has quantity and unit."""
     shape = table.num_rows // len(lines), len(lines)
-    column: dict[str, Any] = {name: table[name].reshape(shape) for name in RESPONSE_SCHEMA.names}
+    column: dict[str, Any] = {name: _widened(table[name]).reshape(shape) for name in RESPONSE_SCHEMA.names}
     value = np.empty(shape, dtype=np.complex128)
     value.real, value.imag = column["re"], column["im"]
     per_line = {name: column[name] for name in PER_LINE if name in column}

@@ -32,6 +32,7 @@ from livebode.tables.table import Column, Field, Schema, Table, Text
 from livebode.tables.thrift_compact import BINARY, I32, I64, LIST, STRUCT, binary, integer, list_of, struct_of, unsigned
 
 _PAGE_ROWS = 1 << 17  # 1 MiB of doubles
+_PROBE_BYTES = 1 << 12
 _Buffer = bytes | memoryview
 
 
@@ -240,6 +241,19 @@ def _of_schema(columns: tuple[tuple[str, str, _Pairs], ...], metadata: _Pairs) -
     return list_of(STRUCT, [root, *map(_element, schema)]), list_of(STRUCT, entries)
 
 
+def _is_compressible(data: _Buffer) -> bool:
+    """Whether parts of a page become smaller: measured numbers, most of a file, are not compressed in vain."""
+    if len(data) <= 4 * _PROBE_BYTES:
+        return True
+    places = 0, len(data) // 2, len(data) - _PROBE_BYTES
+    parts = b"".join(data[begin : begin + _PROBE_BYTES] for begin in places)
+    return _saves(len(lz4.block.compress(parts, store_size=False)), len(parts))
+
+
+def _saves(stored_bytes: int, size_bytes: int) -> bool:
+    return 10 * stored_bytes < 9 * size_bytes
+
+
 class _Chunk:
     """The pages of a column in a row group."""
 
@@ -247,11 +261,12 @@ class _Chunk:
         self._field = field
         pages, self._bounds = encoded(column, field.kind, repeating=repeating)
         self._has_dictionary = pages[0].kind == DICTIONARY_PAGE
-        stored: list[bytes | memoryview] = [lz4.block.compress(page.data, store_size=False) for page in pages]
-        size_bytes = sum(len(page.data) for page in pages)
-        self._codec = LZ4_RAW if 10 * sum(map(len, stored)) < 9 * size_bytes else UNCOMPRESSED
-        if self._codec == UNCOMPRESSED:  # it is read without a copy
-            stored = [page.data for page in pages]
+        stored, size_bytes = [page.data for page in pages], sum(len(page.data) for page in pages)
+        self._codec = UNCOMPRESSED  # is read without a copy
+        if _is_compressible(pages[-1].data):
+            smaller = [lz4.block.compress(page.data, store_size=False) for page in pages]
+            if _saves(sum(map(len, smaller)), size_bytes):
+                self._codec, stored = LZ4_RAW, smaller
         heads = [_page_header(page, len(data)) for page, data in zip(pages, stored)]
         self.parts = [part for pair in zip(heads, stored) for part in pair]
         self.size_bytes = sum(map(len, heads)) + size_bytes

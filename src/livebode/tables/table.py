@@ -230,14 +230,18 @@ class Table:
         return from_arrow(data)
 
     @classmethod
-    def join(cls, parts: Sequence[Table]) -> Table:
-        """The rows of all parts, one after the other, with the schema of the first; ValueError if others differ."""
-        if not parts[1:]:
+    def join(cls, parts: Sequence[Table], schema: Schema | None = None) -> Table:
+        """The rows of all parts, one after the other; ValueError if the columns of one differ.
+
+        With the schema of the first, or another one, whose floating-point numbers may have fewer digits.
+        """
+        schema = parts[0].schema if schema is None else schema
+        if not parts[1:] and parts[0].schema == schema:
             return parts[0]
-        names = parts[0].schema.names
-        if any(part.schema.names != names for part in parts):
+        if any(part.schema.names != schema.names for part in parts):
             raise ValueError("the tables have different columns")
-        return cls(parts[0].schema, tuple(_joined(columns) for columns in zip(*(part.columns for part in parts))))
+        columns = zip(*(part.columns for part in parts))
+        return cls(schema, tuple(map(_joined, columns, schema)))
 
     @property
     def num_rows(self) -> int:
@@ -305,10 +309,11 @@ def _no_rows(field: Field) -> Column:
     return Text((), np.empty(0, np.int32)) if field.kind == STRING else np.empty(0, field.dtype)
 
 
-def _joined(columns: Sequence[Column]) -> Column:
+def _joined(columns: Sequence[Column], field: Field) -> Column:
     if isinstance(columns[0], Text):
         return Text.join([column for column in columns if isinstance(column, Text)])
-    return np.concatenate([column for column in columns if not isinstance(column, Text)])
+    with np.errstate(over="ignore", under="ignore"):  # of fewer digits: infinite, or 0
+        return np.concatenate([column for column in columns if not isinstance(column, Text)], dtype=field.dtype)
 
 
 def _equal(column: Column, other: Column) -> bool:

@@ -101,9 +101,9 @@ class TableFile:
     """
 
     def __init__(self, path: Path, table: ColumnTable) -> None:
-        self._path = path
+        self._path, self._schema = path, table.of_recording
         self._file = path.open("wb")
-        self._writer = SegmentWriter(self._file, table.schema, table.repeating)
+        self._writer = SegmentWriter(self._file, self._schema, table.repeating)
         self._waiting: list[Table] = []
         self._rows = 0
         self._segment: Segment | None = None
@@ -143,5 +143,5 @@ class TableFile:
 
     def _write(self, waiting: list[Table]) -> None:
         # One group, so that it ends with a complete response: a damaged one is skipped without cutting the next.
-        self._writer.write(Table.join(waiting))
+        self._writer.write(Table.join(waiting, self._schema))
         self._file.flush()

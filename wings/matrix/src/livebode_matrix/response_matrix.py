@@ -25,8 +25,8 @@ from livebode.core import (
     Stateful,
     StatefulBase,
 )
-from livebode.estimation import nearest_hop
-from livebode.preparation import LIVE_RESPONSES_PER_S, check_length, chosen_part
+from livebode.estimation import nearest_hop, quarter_hop
+from livebode.preparation import LIVE_RESPONSES_PER_S, check_length, chosen_part, is_timed
 from livebode.records import MATRIX_TABLES
 from livebode.runtime import (
     SEEN_AGAIN_BYTES,
@@ -292,7 +292,8 @@ def examined_matrix(axis: Axis, logs: Sequence[Log], to: Destination) -> Examine
     """A recording, which is tracked at once."""
     (log,) = logs
     log = _part(axis, log)
-    estimate = ResponseMatrix.of(axis, log.rate_hz)
+    hop = None if is_timed(axis) else quarter_hop(matrix_lines(axis, log.rate_hz).window)
+    estimate = ResponseMatrix.of(axis, log.rate_hz, hop)
     log = log.naming(estimate.channels)
     check_length(log.samples, estimate.window)
     return ExaminedRecording(axis, log, estimate, of_log(log), log.clock_kind, dated(log))
