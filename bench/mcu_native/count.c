@@ -99,7 +99,7 @@ static void kernel(uint32_t bin_count, lb_table table, const char *name)
     for (uint32_t i = 0; i < bin_count; ++i) {
         bins[i] = 2u * (i + 1u);
     }
-    const lb_config config = {WINDOW, CHANNELS, bin_count, bins, LB_MODULATED, 0.0, LB_BEST, table};
+    const lb_config config = {WINDOW, CHANNELS, bin_count, bins, LB_MODULATED, 0.0, LB_BEST, table, 0};
     static real sums[2 * CHANNELS * BINS_MAX], frf[2 * BINS_MAX];
     tally push = {0, 0}, hop = {0, 0};
     dft_type *dft;
