@@ -1,6 +1,6 @@
 /* Samples by the hop: tables, part-hops and rows of hop.h. */
 #include "hop.h"
-#include "state.h"
+#include "one.h"
 #include "twiddle.h"
 
 /* cos and sin of 2πk·number/2N at a bin's place among the blocks; `step` reals follow to those of the next block. */
@@ -19,10 +19,11 @@ static void fill(const LB_DFT *t, real *at, size_t step, uint64_t number)
 
 void LB(fill_hops)(LB_DFT *t)
 {
-    const size_t pairs = lb_pairs(t), step = pairs * 2 * LB_BLOCK;
+    /* Vectors go along the pairs of a block; without them every sample goes along the bins of a pair. */
+    const size_t pairs = lb_pairs(t), next = LB_TILE ? 2 * LB_BLOCK : t->row_length, step = LB_TILE ? pairs * next : 2;
     LB_ASSERT(t->hop && t->window % t->hop == 0);
     for (size_t i = 0; i < pairs; ++i) {
-        fill(t, t->table + i * 2 * LB_BLOCK, step, 2u * i + (t->hop % 2u ? 0u : 1u));
+        fill(t, t->table + i * next, step, 2u * i + (t->hop % 2u ? 0u : 1u));
     }
     for (size_t b = 0; b < t->blocks && t->hop % 2u; ++b) { /* the middle sample is its own pair */
         for (size_t i = 0; i < LB_BLOCK; ++i) {
@@ -40,19 +41,28 @@ void LB(reset_hops)(LB_DFT *t)
     for (size_t i = 0; i < t->channels * lb_places(t) * t->row_length; ++i) {
         t->ring[i] = 0;
     }
+    LB(resume_hops)(t);
 }
 
 void LB(hop_row)(const LB_DFT *t, size_t channel, lb_phase phase, real *out)
 {
     const uint32_t hops = t->index / t->hop;
     const real *turn = t->turns + (size_t)((hops ? hops : lb_places(t)) - 1u) * t->row_length;
+    const real *sums = lb_sums(t, channel);
+    if (phase == LB_PHASE_FIXED) {
+        for (size_t b = 0; b < t->bin_count; ++b, out += 2) {
+            out[0] = sums[lb_sum_at(b)];
+            out[1] = sums[lb_sum_at(b) + LB_BLOCK];
+        }
+        return;
+    }
     for (size_t b = 0; b < t->bin_count; ++b, out += 2) {
-        const real *sum = lb_sums(t, channel) + lb_sum_at(b), re = sum[0], im = sum[LB_BLOCK];
+        const real re = sums[lb_sum_at(b)], im = sums[lb_sum_at(b) + LB_BLOCK];
         const real *v = turn + lb_cos_at(b), *a = t->ahead + lb_cos_at(b);
         const real cosine = v[0] * a[0] - v[LB_BLOCK] * a[LB_BLOCK];
         const real sine = v[0] * a[LB_BLOCK] + v[LB_BLOCK] * a[0];
-        out[0] = phase == LB_PHASE_FIXED ? re : re * cosine - im * sine;
-        out[1] = phase == LB_PHASE_FIXED ? im : re * sine + im * cosine;
+        out[0] = re * cosine - im * sine;
+        out[1] = re * sine + im * cosine;
     }
 }
 
@@ -142,66 +152,130 @@ void LB(resume_hops)(LB_DFT *t) { (void)t; }
 
 #else
 
-/* A channel's sample makes a pair with an earlier one of its hop; P of the hop begins with the pair at its centre. */
-static void pair(const LB_DFT *t, uint32_t channel, uint32_t place)
+/* P of one bin; returns the next one's. */
+LB_OFTEN real *pair_one(real *p, turn w, real even, real odd)
 {
-    const uint32_t number = place - (t->hop - lb_pairs(t)), step = 2u * lb_pairs(t);
-    const real *line = t->line + channel * t->line_length;
-    const real even = line[t->hop - 1u - place] + line[place], odd = line[t->hop - 1u - place] - line[place];
-    const real *w = t->table + 2u * number;
-    real *p = t->work + channel * 2u * t->blocks, *end = p + 2u * t->blocks;
-    for (; p != end; p += 2, w += step) {
-        p[0] = (number ? p[0] : 0) + w[0] * even;
-        p[1] = (number ? p[1] : 0) + w[1] * odd;
-    }
+#if LB_SEVERAL
+    register real re __asm__("s4"), im __asm__("s5");
+    __asm__ volatile("vldmia %2, {s4, s5}" : "=t"(re), "=t"(im) : "r"(p) : "memory");
+    re += w.c * even;
+    im += w.s * odd;
+    __asm__ volatile("vstmia %0!, {s4, s5}" : "+r"(p) : "t"(re), "t"(im) : "memory");
+    return p;
+#else
+    p[0] += w.c * even;
+    p[1] += w.s * odd;
+    return p + 2;
+#endif
 }
 
-/* The end of a hop. */
-static void add(const LB_DFT *t, uint32_t channel)
+/* The samples at a place make pairs with earlier ones of their hop. Two channels at a time share the loaded weights. */
+LB_RARELY void pair(const LB_DFT *t, uint32_t place)
 {
-    const uint32_t place = t->index / t->hop, places = lb_places(t);
-    const real *turn = t->turns + place * t->row_length, *p = t->work + channel * t->row_length;
-    real *ring = t->ring + ((size_t)channel * places + place) * t->row_length;
-    real *a = lb_sums(t, channel), *end = a + 4u * t->blocks;
-    for (; a != end; a += 4, p += 2, turn += 2, ring += 2) {
-        const real re = p[0] * turn[0] + p[1] * turn[1], im = p[1] * turn[0] - p[0] * turn[1];
-        a[0] += re - ring[0];
-        a[1] += im - ring[1];
-        a[2] += re;
-        a[3] += im;
-        ring[0] = re;
-        ring[1] = im;
-        if (place + 1u == places) {
-            a[0] = a[2];
-            a[1] = a[3];
-            a[2] = a[3] = 0;
+    const uint32_t pairs = lb_pairs(t), before = t->hop - 1u - place;
+    const real *weights = t->table + (place - (t->hop - pairs)) * t->row_length, *line = t->line;
+    real *p = t->work;
+    uint32_t left = t->channels;
+    LB_ASSERT(place < t->hop && before <= place);
+    for (; left >= 2u; left -= 2u, line += 2u * t->line_length) {
+        const real *next = line + t->line_length, *w = weights;
+        const real even = line[before] + line[place], odd = line[before] - line[place];
+        const real even_next = next[before] + next[place], odd_next = next[before] - next[place];
+        for (real *end = p + t->row_length, *other = end; p != end;) {
+            const turn now = take_turn(&w);
+            p = pair_one(p, now, even, odd);
+            other = pair_one(other, now, even_next, odd_next);
+        }
+        p += t->row_length;
+    }
+    if (left) {
+        const real even = line[before] + line[place], odd = line[before] - line[place];
+        for (const real *w = weights, *end = p + t->row_length; p != end;) {
+            p = pair_one(p, take_turn(&w), even, odd);
         }
     }
 }
+
+/* P of one bin, which begins again, as Q on the fixed grid. */
+LB_OFTEN turn turned(real *p, turn w)
+{
+    const real a = p[0], b = p[1];
+    const turn q = {a * w.c + b * w.s, b * w.c - a * w.s};
+    p[0] = p[1] = 0;
+    return q;
+}
+
+/* S and F of one bin gain Q, and S loses that of a window before; returns the next bin's. */
+LB_OFTEN real *add_one(real *a, turn q, const real *ring, int ends)
+{
+#if LB_SEVERAL
+    register real re __asm__("s4"), im __asm__("s5"), f_re __asm__("s6"), f_im __asm__("s7");
+    __asm__ volatile("vldmia %4, {s4-s7}" : "=t"(re), "=t"(im), "=t"(f_re), "=t"(f_im) : "r"(a) : "memory");
+    f_re += q.c;
+    f_im += q.s;
+    re = ends ? f_re : re + (q.c - ring[0]);
+    im = ends ? f_im : im + (q.s - ring[1]);
+    f_re = ends ? 0 : f_re;
+    f_im = ends ? 0 : f_im;
+    __asm__ volatile("vstmia %0!, {s4-s7}" : "+r"(a) : "t"(re), "t"(im), "t"(f_re), "t"(f_im) : "memory");
+    return a;
+#else
+    const real f_re = a[2] + q.c, f_im = a[3] + q.s;
+    a[0] = ends ? f_re : a[0] + (q.c - ring[0]);
+    a[1] = ends ? f_im : a[1] + (q.s - ring[1]);
+    a[2] = ends ? 0 : f_re;
+    a[3] = ends ? 0 : f_im;
+    return a + 4;
+#endif
+}
+
+/* The end of a hop, for every channel. */
+LB_OFTEN void end_hop(const LB_DFT *t, int ends)
+{
+    const uint32_t place = t->index / t->hop;
+    const real *turns = t->turns + place * t->row_length;
+    const size_t ahead = lb_places(t) * t->row_length;
+    real *a = t->sums, *p = t->work, *ring = t->ring + place * t->row_length;
+    for (uint32_t c = 0; c < t->channels; ++c, ring += ahead) {
+        real *old = ring;
+        const real *w = turns;
+        for (real *end = p + t->row_length; p != end; p += 2, old += 2) {
+            const turn q = turned(p, take_turn(&w));
+            a = add_one(a, q, old, ends);
+            old[0] = q.c;
+            old[1] = q.s;
+        }
+    }
+}
+
+/* One body for each, so that the loop contains no branch on it. */
+LB_RARELY void end_of_hop(const LB_DFT *t) { end_hop(t, 0); }
+LB_RARELY void end_of_period(const LB_DFT *t) { end_hop(t, 1); }
 
 void LB(resume_hops)(LB_DFT *t)
 {
-    for (uint32_t c = 0; c < t->channels; ++c) {
-        for (uint32_t place = t->hop - lb_pairs(t); place < t->index % t->hop; ++place) {
-            pair(t, c, place);
-        }
+    for (size_t i = 0; i < t->channels * t->row_length; ++i) {
+        t->work[i] = 0;
+    }
+    for (uint32_t place = t->hop - lb_pairs(t); place < t->index % t->hop; ++place) {
+        pair(t, place);
     }
 }
 
 void LB(hop_step)(LB_DFT *t, const real *samples, ptrdiff_t stride)
 {
-    const uint32_t place = t->index % t->hop;
+    const uint32_t place = t->index % t->hop, next = t->index + 1u;
     LB_ASSERT(lb_sound(t));
     for (uint32_t c = 0; c < t->channels; ++c, samples += stride) {
         t->line[c * t->line_length + place] = *samples;
-        if (place >= t->hop - lb_pairs(t)) {
-            pair(t, c, place);
-        }
-        if (place + 1u == t->hop) {
-            add(t, c);
-        }
+    }
+    if (place >= t->hop - lb_pairs(t)) {
+        pair(t, place);
+    }
+    if (place + 1u == t->hop) {
+        (next < t->window ? end_of_hop : end_of_period)(t);
     }
     ++t->count;
-    t->index = t->index + 1u < t->window ? t->index + 1u : 0u;
+    t->index = next < t->window ? next : 0u;
 }
 #endif
