@@ -109,11 +109,6 @@ class SlidingDFT(_native.Engine):
         return self._variant
 
     @property
-    def hop(self) -> int | None:
-        """Hop of the spectra; None: they are after any sample."""
-        return self._hop or None
-
-    @property
     def instruction_set(self) -> str:
         """Instruction set in use: "baseline", "avx2" or "avx512"."""
         return _instructions.NAMES[self._instruction_set()]
