@@ -6,7 +6,7 @@ import numpy as np
 
 from bench import contenders, numba_versions
 from bench.work import CELLS, HOP, ROWS, Array, side_by_side, signal
-from livebode.kernel import SlidingDFT
+from livebode.kernel import SlidingDFT, own_hop
 
 FAST = {
     "fastgoertzel": contenders.by_fastgoertzel,
@@ -27,7 +27,7 @@ class Ours:
     """A continuous stream: each call processes the next ROWS·hop samples into the same buffer."""
 
     def __init__(self, window: int, bins: list[int], hop: int, phase: str) -> None:
-        self.dft, self.hop, self.phase = SlidingDFT(window, bins), hop, phase
+        self.dft, self.hop, self.phase = SlidingDFT(window, bins, hop=own_hop(window, hop)), hop, phase
         self.x = signal(ROWS * hop)
         self.out = np.empty((ROWS, len(bins)), complex)
 

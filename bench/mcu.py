@@ -16,7 +16,7 @@ from tools.firmware import M4F, M7, ROOT, Core, flash, missing, run
 
 NATIVE = ROOT / "bench" / "mcu_native"
 WINDOW, HOP, CHANNELS = 400, 20, 2
-TABLES = ("rows", "compact")
+TABLES = ("rows", "compact", "hop")
 COUNTS = (7, 21)
 SAMPLES = 2 * WINDOW
 LIMIT, WORST = 600, 750  # 21 lines with a table of rows on the Cortex-M4F: per sample, and of a single push

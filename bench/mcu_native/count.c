@@ -15,7 +15,7 @@ typedef lb_sdft32 dft_type;
 #endif
 typedef rls_real real;
 
-enum { WINDOW = 400, CHANNELS = 2, BINS_MAX = 21 };
+enum { WINDOW = 400, HOP = 20, CHANNELS = 2, BINS_MAX = 21 };
 
 static int out;
 static unsigned char memory[1 << 17];
@@ -93,13 +93,13 @@ static void quotients(const real *u, const real *y, uint32_t bins, real *frf)
     }
 }
 
-static void kernel(uint32_t bin_count, lb_table table, const char *name)
+static void kernel(uint32_t bin_count, lb_table table, uint32_t own_hop, const char *name)
 {
     uint32_t bins[BINS_MAX];
     for (uint32_t i = 0; i < bin_count; ++i) {
         bins[i] = 2u * (i + 1u);
     }
-    const lb_config config = {WINDOW, CHANNELS, bin_count, bins, LB_MODULATED, 0.0, LB_BEST, table};
+    const lb_config config = {WINDOW, CHANNELS, bin_count, bins, LB_MODULATED, 0.0, LB_BEST, table, own_hop};
     static real sums[2 * CHANNELS * BINS_MAX], frf[2 * BINS_MAX];
     tally push = {0, 0}, hop = {0, 0};
     dft_type *dft;
@@ -150,10 +150,12 @@ int main(void)
     for (uint32_t turns = 1; turns <= 100000u; turns *= 10u) {
         known_loop(turns);
     }
-    kernel(7, LB_TABLE_ROWS, "7 rows");
-    kernel(21, LB_TABLE_ROWS, "21 rows");
-    kernel(7, LB_TABLE_COMPACT, "7 compact");
-    kernel(21, LB_TABLE_COMPACT, "21 compact");
+    kernel(7, LB_TABLE_ROWS, 0, "7 rows");
+    kernel(21, LB_TABLE_ROWS, 0, "21 rows");
+    kernel(7, LB_TABLE_COMPACT, 0, "7 compact");
+    kernel(21, LB_TABLE_COMPACT, 0, "21 compact");
+    kernel(7, LB_TABLE_ROWS, HOP, "7 hop");
+    kernel(21, LB_TABLE_ROWS, HOP, "21 hop");
     least_squares();
     return 0;
 }

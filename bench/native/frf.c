@@ -23,7 +23,7 @@ typedef struct {
 
 void *frf_new(uint32_t window, uint32_t bin_count, const uint32_t *bins, int set)
 {
-    const lb_config config = {window, 2, bin_count, bins, LB_MODULATED, 0.0, (lb_instruction_set)set, LB_TABLE_ROWS};
+    const lb_config config = {window, 2, bin_count, bins, LB_MODULATED, 0.0, (lb_instruction_set)set, LB_TABLE_ROWS, 0};
     tracker *t = (tracker *)calloc(1, sizeof *t);
     size_t bytes;
     if (!t || bin_count > BINS_MAX || lb_sdft64_size(&config, &bytes) != LB_OK) {

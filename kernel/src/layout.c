@@ -33,6 +33,9 @@ static lb_status check(const lb_config *c)
     if (c->variant == LB_DAMPED && !(c->damping > 0.0 && c->damping < 1.0)) {
         return LB_ERROR_DAMPING;
     }
+    if (c->hop && (c->window % c->hop || c->variant != LB_MODULATED || c->table != LB_TABLE_ROWS)) {
+        return LB_ERROR_HOP;
+    }
     if ((unsigned)c->table > LB_TABLE_COMPACT || (c->table == LB_TABLE_COMPACT && c->window > LB_COMPACT_WINDOW_MAX)) {
         return LB_ERROR_TABLE;
     }
@@ -62,9 +65,11 @@ static void lay_out(LB_DFT *t, cursor *at, const lb_config *c)
     const uint64_t most = c->bin_count * (1u + reach);
     const uint64_t inner = most < c->window ? most : c->window;
     const uint64_t blocks = (inner + LB_BLOCK - 1u) / LB_BLOCK;
-    const uint64_t line = (c->window * bytes + LB_ALIGN - 1u) / LB_ALIGN * LB_ALIGN / bytes;
-    const uint64_t row = blocks * 2u * LB_BLOCK, rows = (c->window + 1u) / 2u + 1u;
-    LB_ASSERT(inner >= c->bin_count && line >= c->window);
+    const uint64_t samples = c->hop ? c->hop : c->window, places = c->hop ? c->window / c->hop : 0u;
+    const uint64_t line = (samples * bytes + LB_ALIGN - 1u) / LB_ALIGN * LB_ALIGN / bytes;
+    const uint64_t row = blocks * 2u * LB_BLOCK, rows = c->hop ? (c->hop + 1u) / 2u : (c->window + 1u) / 2u + 1u;
+    const uint64_t columns = !c->hop ? 0u : LB_TILE ? LB_COLUMNS : c->channels;
+    LB_ASSERT(inner >= c->bin_count && line >= samples);
     LB_ASSERT(!at->base || at->bytes); /* the object itself comes first */
 
     t->compact = c->table == LB_TABLE_COMPACT;
@@ -75,8 +80,12 @@ static void lay_out(LB_DFT *t, cursor *at, const lb_config *c)
     t->rows = (real *)take(at, t->compact ? (LB_TILE + 1u) * row * bytes : 0u);
     t->sums = (real *)take(at, c->channels * blocks * 4u * LB_BLOCK * bytes);
     t->line = (real *)take(at, c->channels * line * bytes);
-    t->delta = (real *)take(at, (uint64_t)c->channels * 3u * LB_TILE * bytes);
-    t->queue = (real *)take(at, (uint64_t)c->channels * LB_TILE * bytes);
+    t->delta = (real *)take(at, c->hop ? 0u : (uint64_t)c->channels * 3u * LB_TILE * bytes);
+    t->queue = (real *)take(at, c->hop ? 0u : (uint64_t)c->channels * LB_TILE * bytes);
+    t->turns = (real *)take(at, places * row * bytes);
+    t->ahead = (real *)take(at, c->hop ? row * bytes : 0u);
+    t->ring = (real *)take(at, c->channels * places * row * bytes);
+    t->work = (real *)take(at, columns * row * bytes);
     t->spectrum = (real *)take(at, reach ? inner * 2u * bytes : 0u);
     t->bins = (uint32_t *)take(at, inner * sizeof(uint32_t));
     t->taps = (uint32_t *)take(at, reach ? (uint64_t)c->bin_count * 4u * sizeof(uint32_t) : 0u);
@@ -114,8 +123,34 @@ static uint32_t place_of(LB_DFT *t, uint32_t *place, uint32_t k)
     return place[k] - 1u;
 }
 
+/* Bins of rows at a hop, found twice by a table of places without neighbours: weights for each bin are filled later. */
+static lb_status fill_bins_of_hops(LB_DFT *t, const lb_config *c)
+{
+    uint32_t *found = (uint32_t *)(void *)t->table;
+    const uint32_t K = c->bin_count, size = 2u * K;
+    LB_ASSERT(lb_pairs(t) * t->row_length * sizeof(real) >= size * sizeof *found);
+    for (uint32_t i = 0; i < size; ++i) {
+        found[i] = UINT32_MAX;
+    }
+    for (uint32_t i = 0; i < K; ++i) {
+        uint32_t at = c->bins[i] % size;
+        while (found[at] != UINT32_MAX && found[at] != c->bins[i]) {
+            at = at + 1u < size ? at + 1u : 0u;
+        }
+        if (found[at] == c->bins[i]) {
+            return LB_ERROR_BINS;
+        }
+        t->bins[i] = found[at] = c->bins[i];
+    }
+    t->inner_count = K;
+    return LB_OK;
+}
+
 static lb_status fill_bins(LB_DFT *t, const lb_config *c)
 {
+    if (t->hop) {
+        return fill_bins_of_hops(t, c);
+    }
     /* The table is filled later and larger than this: room to find duplicates without searching. */
     uint32_t *place = (uint32_t *)(void *)t->table;
     const uint32_t N = t->window, reach = lb_reach(c->variant);
@@ -168,6 +203,7 @@ lb_status LB(init)(void *memory, size_t bytes, const lb_config *config, LB_DFT *
     t->window = config->window;
     t->channels = config->channels;
     t->bin_count = config->bin_count;
+    t->hop = config->hop;
     t->inner_count = 0;
     t->half = (config->window + 1u) / 2u;
     t->damping = config->variant == LB_DAMPED ? config->damping : 1.0;
@@ -182,7 +218,7 @@ lb_status LB(init)(void *memory, size_t bytes, const lb_config *config, LB_DFT *
     if (status != LB_OK) {
         return status;
     }
-    LB(fill_table)(t);
+    (t->hop ? LB(fill_hops) : LB(fill_table))(t);
     *dft = t;
     return LB(reset)(t);
 }
@@ -201,6 +237,9 @@ lb_status LB(reset)(LB_DFT *t)
     }
     for (size_t i = 0; i < t->channels * t->line_length; ++i) {
         t->line[i] = 0;
+    }
+    if (t->hop) {
+        LB(reset_hops)(t);
     }
     LB_ASSERT(lb_sound(t));
     return LB_OK;

@@ -61,6 +61,10 @@ LB_RARELY void unrenewed(const LB_DFT *t, const real *samples, ptrdiff_t stride)
 static void step(LB_DFT *t, const real *samples, ptrdiff_t stride)
 {
     LB_ASSERT(lb_sound(t));
+    if (t->hop) {
+        LB(hop_step)(t, samples, stride);
+        return;
+    }
     const uint32_t index = t->index, next = index + 1u < t->window ? index + 1u : 0u;
     if (!lb_renews(t->variant)) {
         unrenewed(t, samples, stride);
@@ -97,6 +101,7 @@ lb_status LB(choose)(LB_DFT *t, lb_instruction_set set)
 {
     t->set = LB_BASELINE;
     t->kernel = 0;
+    t->run_hops = 0;
     return set == LB_BEST || set == LB_BASELINE ? LB_OK : LB_ERROR_INSTRUCTION_SET;
 }
 

@@ -43,6 +43,10 @@ void LB(emit)(const LB_DFT *t, size_t channel, lb_phase phase, real *out)
 {
     LB_ASSERT(lb_sound(t) && channel < t->channels);
     LB_ASSERT(!t->queued); /* the sums contain every sample */
+    if (t->hop) {
+        LB(hop_row)(t, channel, phase, out);
+        return;
+    }
     if (t->variant == LB_MODULATED) {
         LB(row)(t, channel, phase, out);
         return;

@@ -9,13 +9,11 @@
 typedef double real;
 typedef int64_t lb_lane_index;
 #define LB_DFT lb_sdft64
-#define LB_STAGE lb_stage64
 #define LB(name) lb_sdft64_##name
 #elif LB_BITS == 32
 typedef float real;
 typedef int32_t lb_lane_index;
 #define LB_DFT lb_sdft32
-#define LB_STAGE lb_stage32
 #define LB(name) lb_sdft32_##name
 #else
 #error "compile with -DLB_BITS=32 or -DLB_BITS=64"
@@ -36,11 +34,6 @@ typedef int32_t lb_lane_index;
 #define LB_TILE 0 /* no sample waits */
 #elif !defined(LB_TILE)
 #define LB_TILE 128
-#endif
-
-/* The same where every sample gives a row: rows, samples and table rows remain in the first-level cache. */
-#ifndef LB_DENSE_TILE
-#define LB_DENSE_TILE 64
 #endif
 
 #endif

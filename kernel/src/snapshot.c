@@ -7,7 +7,7 @@
 
 typedef struct {
     uint32_t magic, version, bits, variant;
-    uint32_t window, channels, bin_count, reserved;
+    uint32_t window, channels, bin_count, hop;
     uint64_t count;
     double damping;
 } header;
@@ -46,18 +46,34 @@ static header header_of(const LB_DFT *t)
         .window = t->window,
         .channels = t->channels,
         .bin_count = t->bin_count,
-        .reserved = 0u,
+        .hop = t->hop,
         .count = t->count,
         .damping = t->damping,
     };
     return h;
 }
 
+/* Samples of a channel's delay line. */
+static size_t delayed(const LB_DFT *t) { return t->hop ? t->hop : t->window; }
+
+/* A channel's sums, bin by bin; with a hop the ring follows, hop by hop. */
+static size_t sums_of(const LB_DFT *t) { return (4u + (t->hop ? 2u * lb_places(t) : 0u)) * (size_t)t->inner_count; }
+
+static real *sum_at(const LB_DFT *t, size_t channel, size_t number)
+{
+    const size_t K = t->inner_count;
+    if (number < 4u * K) {
+        return lb_sums(t, channel) + lb_sum_at(number / 4u) + number % 4u * LB_BLOCK;
+    }
+    number -= 4u * K;
+    real *row = t->ring + (channel * lb_places(t) + number / (2u * K)) * t->row_length;
+    return row + lb_cos_at(number % (2u * K) / 2u) + number % 2u * LB_BLOCK;
+}
+
 static size_t length_of(const LB_DFT *t)
 {
     LB_ASSERT(lb_laid_out(t));
-    const size_t per_channel = t->window + 4u * (size_t)t->inner_count;
-    return sizeof(header) + t->bin_count * sizeof(uint32_t) + t->channels * per_channel * sizeof(real) +
+    return sizeof(header) + t->bin_count * sizeof(uint32_t) + t->channels * (delayed(t) + sums_of(t)) * sizeof(real) +
            sizeof(uint32_t);
 }
 
@@ -88,11 +104,14 @@ lb_status LB(snapshot)(LB_DFT *t, void *out, size_t bytes)
     copy(at, (const unsigned char *)t->bins, t->bin_count * sizeof(uint32_t));
     at += t->bin_count * sizeof(uint32_t);
     for (size_t c = 0; c < t->channels; ++c) {
-        copy(at, (const unsigned char *)(t->line + c * t->line_length), t->window * sizeof(real));
-        at += t->window * sizeof(real);
-        for (size_t i = 0; i < 4u * (size_t)t->inner_count; ++i, at += sizeof(real)) {
-            const real *sum = lb_sums(t, c) + lb_sum_at(i / 4) + i % 4 * LB_BLOCK;
-            copy(at, (const unsigned char *)sum, sizeof(real));
+        real *line = t->line + c * t->line_length;
+        for (size_t i = t->hop ? t->index % t->hop : t->window; i < t->hop; ++i) {
+            line[i] = 0; /* of an earlier hop, or not */
+        }
+        copy(at, (const unsigned char *)line, delayed(t) * sizeof(real));
+        at += delayed(t) * sizeof(real);
+        for (size_t i = 0; i < sums_of(t); ++i, at += sizeof(real)) {
+            copy(at, (const unsigned char *)sum_at(t, c, i), sizeof(real));
         }
     }
     LB_ASSERT((size_t)(at - (unsigned char *)out) == bytes - sizeof(uint32_t));
@@ -117,7 +136,7 @@ static lb_status examine(const LB_DFT *t, const unsigned char *from, size_t byte
     }
     const header own = header_of(t);
     if (h->bits != own.bits || h->variant != own.variant || h->window != own.window || h->channels != own.channels ||
-        h->bin_count != own.bin_count || h->damping != own.damping) {
+        h->bin_count != own.bin_count || h->hop != own.hop || h->damping != own.damping) {
         return LB_ERROR_SNAPSHOT_CONFIG;
     }
     if (bytes != length_of(t)) {
@@ -148,12 +167,14 @@ lb_status LB(restore)(LB_DFT *t, const void *snapshot, size_t bytes)
     t->index = (uint32_t)(h.count % t->window);
     t->queued = 0;
     for (size_t c = 0; c < t->channels; ++c) {
-        copy((unsigned char *)(t->line + c * t->line_length), at, t->window * sizeof(real));
-        at += t->window * sizeof(real);
-        for (size_t i = 0; i < 4u * (size_t)t->inner_count; ++i, at += sizeof(real)) {
-            real *sum = lb_sums(t, c) + lb_sum_at(i / 4) + i % 4 * LB_BLOCK;
-            copy((unsigned char *)sum, at, sizeof(real));
+        copy((unsigned char *)(t->line + c * t->line_length), at, delayed(t) * sizeof(real));
+        at += delayed(t) * sizeof(real);
+        for (size_t i = 0; i < sums_of(t); ++i, at += sizeof(real)) {
+            copy((unsigned char *)sum_at(t, c, i), at, sizeof(real));
         }
+    }
+    if (t->hop) {
+        LB(resume_hops)(t);
     }
     LB_ASSERT((size_t)(at - (const unsigned char *)snapshot) == bytes - sizeof(uint32_t));
     LB_ASSERT(lb_sound(t));

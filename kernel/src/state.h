@@ -2,14 +2,17 @@
 #ifndef LB_STATE_H
 #define LB_STATE_H
 
+#include "hop.h"
 #include "tile.h"
 
 struct LB_DFT {
     const lb_kernel *kernel;
+    lb_run_hops *run_hops;
     lb_instruction_set set;
     lb_variant variant;
     double damping;
     uint32_t window, channels, bin_count;
+    uint32_t hop;         /* 0: rows after any sample */
     uint32_t inner_count; /* the requested bins, then the neighbours that a window's taps need */
     uint32_t half;        /* ⌈N/2⌉: from this index on the table is read backwards */
     size_t blocks;        /* of inner bins */
@@ -21,18 +24,23 @@ struct LB_DFT {
     uint32_t index;       /* of the next sample in its period: count mod N */
     uint32_t queued;      /* newer waiting samples, < LB_TILE */
     int compact;          /* the table is [window][2]: cos, sin of 2πr/N */
-    real *table;          /* else [half + 1][blocks][2][LB_BLOCK]: cos, sin */
+    real *table;          /* else [half + 1][blocks][2][LB_BLOCK]: cos, sin; with a hop its weights: hop.h */
     real *rows;           /* compact: [LB_TILE + 1][blocks][2][LB_BLOCK], gathered from the table */
     real *sums;           /* [channels][blocks][4][LB_BLOCK] */
-    real *line;           /* [channels][line_length], the newest N samples, by index */
-    real *delta;          /* [channels][3][LB_TILE], of the tile at work: see tile.h */
-    real *queue;          /* [channels][LB_TILE] */
-    real *spectrum;       /* [inner_count][2], scratch of the windows */
-    uint32_t *bins;       /* [inner_count] */
-    uint32_t *taps;       /* [bin_count][4]: places among the inner bins of k−1, k+1, k−2, k+2 */
+    real *line;     /* [channels][line_length], the newest N samples, by index; with a hop those of the last one */
+    real *delta;    /* [channels][3][LB_TILE], of the tile at work: see tile.h */
+    real *queue;    /* [channels][LB_TILE] */
+    real *spectrum; /* [inner_count][2], scratch of the windows */
+    real *turns, *ahead, *ring, *work; /* with a hop: hop.h; ring of each channel, and where no sample waits work */
+    uint32_t *bins;                    /* [inner_count] */
+    uint32_t *taps;                    /* [bin_count][4]: places among the inner bins of k−1, k+1, k−2, k+2 */
 };
 
 static inline int lb_renews(lb_variant v) { return v != LB_PLAIN && v != LB_DAMPED; }
+/* With a hop: its pairs of samples, and the hops of a window. */
+static inline uint32_t lb_pairs(const LB_DFT *t) { return (t->hop + 1u) / 2u; }
+static inline uint32_t lb_places(const LB_DFT *t) { return t->window / t->hop; }
+
 static inline int lb_is_windowed(lb_variant v) { return v > LB_DAMPED; }
 
 /* Whether the parts of the memory agree with each other: what init laid out and nothing changes. */
@@ -42,8 +50,9 @@ static inline int lb_laid_out(const LB_DFT *t)
                         t->channels >= 1u && t->channels <= LB_CHANNELS_MAX;
     const int lengths = t->bin_count >= 1u && t->bin_count <= t->inner_count && t->inner_count <= t->window &&
                         t->blocks == (t->inner_count + LB_BLOCK - 1u) / LB_BLOCK &&
-                        t->row_length == t->blocks * 2u * LB_BLOCK && t->line_length >= t->window;
-    return limited && lengths && t->table && t->sums && t->line && t->delta && t->queue && t->bins;
+                        t->row_length == t->blocks * 2u * LB_BLOCK && t->line_length >= (t->hop ? t->hop : t->window);
+    const int divided = !t->hop || (t->window % t->hop == 0 && t->turns && t->ahead && t->ring && t->work);
+    return limited && lengths && divided && t->table && t->sums && t->line && t->delta && t->queue && t->bins;
 }
 
 /* Whether an object is as every call leaves it. */
@@ -73,6 +82,13 @@ static inline size_t lb_sum_at(size_t bin) { return bin / LB_BLOCK * 4 * LB_BLOC
 static inline size_t lb_cos_at(size_t bin) { return bin / LB_BLOCK * 2 * LB_BLOCK + lb_slot(bin % LB_BLOCK); }
 
 void LB(fill_table)(LB_DFT *t);
+
+/* With a hop: tables, the state after init, what is not in a snapshot, and one channel's row after the last whole hop.
+ */
+void LB(fill_hops)(LB_DFT *t);
+void LB(reset_hops)(LB_DFT *t);
+void LB(resume_hops)(LB_DFT *t);
+void LB(hop_row)(const LB_DFT *t, size_t channel, lb_phase phase, real *out);
 
 /* Row `number` of a compact table, gathered at `place` among the rows. */
 const real *LB(gathered)(const LB_DFT *t, uint32_t number, size_t place);
@@ -138,22 +154,23 @@ static inline lb_region lb_region_of(const LB_DFT *t, const lb_input *in, size_t
 typedef struct {
     size_t first, hop;
     lb_phase phase;
-    real *out;              /* next row of channel 0 */
-    size_t channel_reals;   /* from channel to channel */
-    const real *end;        /* of channel 0's rows */
-    struct LB_STAGE *stage; /* where rows wait that go past the caches; null: they do not */
+    real *out;            /* next row of channel 0 */
+    size_t channel_reals; /* from channel to channel */
+    const real *end;      /* of channel 0's rows */
 } lb_rows_due;
 
 /* `length` samples without rows. */
 void LB(skip)(LB_DFT *t, lb_input *in, size_t length);
 
-#ifndef LB_SCALAR
+#ifdef LB_SCALAR
+/* One sample of each channel, with a hop. */
+void LB(hop_step)(LB_DFT *t, const real *samples, ptrdiff_t stride);
+#else
+/* Samples and rows, with a hop. */
+void LB(hop_samples)(LB_DFT *t, lb_input *in, size_t length, lb_rows_due due);
+
 /* The same with rows, which the inner kernels write themselves; LB_MODULATED only. */
 void LB(fused_rows)(LB_DFT *t, lb_input *in, size_t length, lb_rows_due due);
-
-/* The same rows past the caches, and whether that is faster: see stage.h. */
-int LB(staged)(const LB_DFT *t, const lb_rows_due *due);
-void LB(staged_rows)(LB_DFT *t, lb_input *in, size_t length, lb_rows_due due);
 #endif
 
 /* Updates the sums with the waiting samples. */

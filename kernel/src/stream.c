@@ -7,6 +7,9 @@ lb_status LB(rows)(const LB_DFT *t, size_t length, size_t hop, size_t *rows)
         return LB_ERROR_NULL;
     }
     LB_ASSERT(lb_sound(t));
+    if (t->hop && hop % t->hop) {
+        return LB_ERROR_HOP;
+    }
     *rows = hop ? (size_t)(((t->count + t->queued) % hop + length) / hop) : 0;
     return LB_OK;
 }
@@ -34,7 +37,10 @@ lb_status LB(process)(LB_DFT *t, const real *samples, ptrdiff_t channel_stride, 
 {
     size_t expected;
     const lb_status status = LB(rows)(t, length, hop, &expected);
-    if (status != LB_OK || (!samples && length) || (!out && rows)) {
+    if (status != LB_OK) {
+        return status;
+    }
+    if ((!samples && length) || (!out && rows)) {
         return LB_ERROR_NULL;
     }
     if (phase != LB_PHASE_WINDOW && phase != LB_PHASE_FIXED) {
@@ -57,13 +63,16 @@ lb_status LB(process)(LB_DFT *t, const real *samples, ptrdiff_t channel_stride, 
     due.out = out;
     due.channel_reals = rows * 2 * t->bin_count;
     due.end = out + due.channel_reals;
-    due.stage = 0;
     LB_ASSERT(due.first < length);
     LB_ASSERT(lb_apart((void *)lb_region_of(t, &in, length).first, lb_region_of(t, &in, length).bytes, out,
                        t->channels * due.channel_reals * sizeof(real)));
 #ifndef LB_SCALAR
+    if (t->hop) {
+        LB(hop_samples)(t, &in, length, due);
+        return LB_OK;
+    }
     if (t->variant == LB_MODULATED) {
-        (LB(staged)(t, &due) ? LB(staged_rows) : LB(fused_rows))(t, &in, length, due);
+        LB(fused_rows)(t, &in, length, due);
         return LB_OK;
     }
 #endif

@@ -119,7 +119,6 @@ typedef struct {
     int backwards;
     int n;        /* vectors */
     size_t valid; /* of the last block: reals of its rows that exist; else 0 */
-    lb_move move;
 } unit;
 
 /* A row of the last block: the next rows overwrite its surplus; where there are none, only existing values
@@ -138,15 +137,6 @@ LB_INLINE void emit_tail(unit u, unit_sums a, unit_row next)
     }
 }
 
-/* As many numbers as a row of the unit has: writing rows past the caches takes no time while others are computed. */
-LB_INLINE lb_move moved(lb_move m, int n)
-{
-    for (int v = 0; v < 2 * n && m.from != m.end; ++v, m.from += LB_LANES, m.to += LB_LANES) {
-        lb_store_past(m.to, lb_load(m.from));
-    }
-    return m;
-}
-
 LB_INLINE unit emit_row(const lb_tile *t, unit u, unit_sums a, unit_row next)
 {
     LB_ASSERT(u.out < u.out_end);
@@ -157,18 +147,6 @@ LB_INLINE unit emit_row(const lb_tile *t, unit u, unit_sums a, unit_row next)
     }
     u.out += 2 * t->bins;
     return u;
-}
-
-/* F of a whole tile by itself, for processors with too few registers for S, F and a row at once. */
-LB_INLINE void renew(const lb_tile *t, unit u)
-{
-    unit_sums a;
-    load_f(&a, u.sums, u.n);
-    LB_UNROLL_4
-    for (size_t i = 0; i < t->length; ++i, u.row += t->row_step) {
-        a = step_f(a, load_row(u.row, u.n), u.delta + i, u.n);
-    }
-    store_f(u.sums, a, u.n);
 }
 
 /* The end of a period: S = F. Returns S to be stored; F is final in memory. */
@@ -182,60 +160,8 @@ LB_INLINE unit_sums swapped(unit_sums a, const real *sums, int n)
     return a;
 }
 
-/* A row after every sample. The next sample's table row demodulates this one's, so each is loaded once. */
-LB_INLINE void run_dense(const lb_tile *t, unit u, int moving)
-{
-    const int apart = u.backwards && !LB_MANY_REGISTERS, together = u.backwards && LB_MANY_REGISTERS;
-    const size_t before_swap = t->length - (size_t)t->swap;
-    unit_sums a;
-    if (moving) {
-        u.move = *t->move;
-    }
-    if (apart) {
-        renew(t, u);
-    }
-    load_s(&a, u.sums, u.n);
-    if (together) {
-        load_f(&a, u.sums, u.n);
-    }
-    unit_row row = load_row(u.row, u.n), next;
-    for (size_t i = 0; i < before_swap; ++i, row = next) {
-        u.row += t->row_step;
-        next = load_row(u.row, u.n);
-        a = step_s(a, row, u.delta + i, u.backwards, u.n);
-        if (together) {
-            a = step_f(a, row, u.delta + i, u.n);
-        }
-        u = emit_row(t, u, a, next);
-        if (moving) {
-            u.move = moved(u.move, u.n);
-        }
-    }
-    if (moving) {
-        *t->move = u.move;
-    }
-    if (together) {
-        a = t->swap ? step_f(a, row, u.delta + before_swap, u.n) : a;
-        store_f(u.sums, a, u.n);
-    }
-    if (t->swap) {
-        a = swapped(a, u.sums, u.n);
-        (void)emit_row(t, u, a, load_row(u.row + t->row_step, u.n));
-    }
-    store_s(u.sums, a, u.n);
-}
-
-LB_INLINE void run_dense_either(const lb_tile *t, unit u)
-{
-    if (t->move) {
-        run_dense(t, u, 1);
-    } else {
-        run_dense(t, u, 0);
-    }
-}
-
 /* A row after every hop-th sample, or none. */
-LB_INLINE void run_sparse(const lb_tile *t, unit u)
+LB_INLINE void run_unit(const lb_tile *t, unit u)
 {
     const size_t before_swap = t->length - (size_t)t->swap;
     size_t due = t->first, i = 0;
@@ -286,16 +212,8 @@ LB_INLINE void run_blocks(const lb_tile *t, size_t block, int backwards, int blo
         u.backwards = backwards;
         u.n = blocks * LB_PARTS;
         u.valid = tail ? 2 * (t->bins - block * LB_BLOCK) : 0;
-        if (t->hop != 1) {
-            u.phase = t->phase;
-            run_sparse(t, u);
-        } else if (t->phase == LB_PHASE_FIXED) {
-            u.phase = LB_PHASE_FIXED;
-            run_dense_either(t, u);
-        } else {
-            u.phase = LB_PHASE_WINDOW;
-            run_dense_either(t, u);
-        }
+        u.phase = t->phase;
+        run_unit(t, u);
     }
 }
 
@@ -382,13 +300,6 @@ static void take_in(real *restrict delta, real *restrict line, const real *restr
     }
 }
 
-static void finish(lb_move *move)
-{
-    while (move->from != move->end) {
-        *move = moved(*move, 1);
-    }
-}
-
-const lb_kernel LB_KERNEL_NAME = {take_in, run_tile, read_row, finish};
+const lb_kernel LB_KERNEL_NAME = {take_in, run_tile, read_row};
 
 #endif

@@ -13,12 +13,6 @@
 
 #include "real.h"
 
-/* Finished rows on their way past the caches: whole lines of 64 bytes. */
-typedef struct {
-    const real *from, *end;
-    real *to;
-} lb_move;
-
 typedef struct {
     size_t channels, blocks;
     real *sums;         /* [channels][blocks][4][LB_BLOCK] */
@@ -40,7 +34,6 @@ typedef struct {
     real *out;           /* channel 0's first row due, [rows][bins][2] */
     const real *out_end; /* end of channel 0's rows: nothing is written from here on */
     size_t out_step;     /* reals from channel to channel */
-    lb_move *move;       /* null, or what is written meanwhile */
 } lb_tile;
 
 typedef struct {
@@ -49,8 +42,6 @@ typedef struct {
     void (*run)(const lb_tile *tile);
     /* channel 0's row now; uses sums, row, backwards, blocks, phase, bins, out, out_end */
     void (*read)(const lb_tile *tile);
-    /* the rest of what is to be moved */
-    void (*finish)(lb_move *move);
 } lb_kernel;
 
 /* Position of bin b in a block, so that interleaving re and im within 128-bit lanes puts the bins in order. */

@@ -1,5 +1,5 @@
 /* Samples by the tile: store them, and let the inner kernel of the instruction set update the sums. */
-#include "stage.h"
+#include "state.h"
 #ifndef LB_SCALAR
 
 /* The differences and the delay line of one channel's next samples. */
@@ -75,12 +75,7 @@ static void run_part(LB_DFT *t, uint32_t start, uint32_t offset, uint32_t length
     for (size_t c = 0; c < t->channels && (start == t->half || t->window == 1); ++c) {
         seed(t, c);
     }
-    tile.move = 0;
-    if (due->stage) {
-        LB(run_staged)(t, &tile, due->stage);
-    } else {
-        t->kernel->run(&tile);
-    }
+    t->kernel->run(&tile);
 }
 
 /* Moves on to the rows due after `length` further samples. */
@@ -102,7 +97,6 @@ static void passed(lb_rows_due *due, size_t length, size_t row_reals)
 static void run(LB_DFT *t, uint32_t length, lb_rows_due *due)
 {
     LB_ASSERT(length <= t->index && t->index <= t->window);
-    const uint32_t longest = due->stage ? LB(staged_length)(t) : due->hop == 1 ? LB_DENSE_TILE : LB_TILE;
     uint32_t start = t->index - length;
     if (!lb_renews(t->variant)) {
         for (size_t c = 0; c < t->channels; ++c) {
@@ -112,8 +106,7 @@ static void run(LB_DFT *t, uint32_t length, lb_rows_due *due)
     }
     for (uint32_t offset = 0; start < t->index;) {
         const uint32_t end = start < t->half ? t->half : t->window;
-        const uint32_t ahead = (t->index < end ? t->index : end) - start;
-        const uint32_t part = ahead < longest ? ahead : longest;
+        const uint32_t part = (t->index < end ? t->index : end) - start;
         run_part(t, start, offset, part, due);
         if (due->out) {
             passed(due, part, 2 * (size_t)t->bin_count);
@@ -144,7 +137,12 @@ static size_t next_tile(LB_DFT *t, lb_input *in, size_t length, lb_rows_due *due
 /* Without rows. */
 void LB(skip)(LB_DFT *t, lb_input *in, size_t length)
 {
-    lb_rows_due none = {SIZE_MAX, SIZE_MAX, LB_PHASE_FIXED, 0, 0, 0, 0};
+    const lb_rows_due nothing = {SIZE_MAX, SIZE_MAX, LB_PHASE_FIXED, 0, 0, 0};
+    if (t->hop) {
+        LB(hop_samples)(t, in, length, nothing);
+        return;
+    }
+    lb_rows_due none = nothing;
     while (length) {
         length -= next_tile(t, in, length, &none);
     }
@@ -163,6 +161,9 @@ lb_status LB(queue)(LB_DFT *t, const real *samples)
 {
     if (!t || !samples) {
         return LB_ERROR_NULL;
+    }
+    if (t->hop) { /* they wait for the end of the hop */
+        return LB(push)(t, samples);
     }
     LB_ASSERT(lb_sound(t));
     for (size_t c = 0; c < t->channels; ++c) {

@@ -24,25 +24,6 @@ typedef real loose_vec __attribute__((vector_size(LB_LANES * sizeof(real)), may_
 LB_INLINE vec lb_load(const real *p) { return *(const vec *)(const void *)p; }
 LB_INLINE void lb_store(real *p, vec v) { *(vec *)(void *)p = v; }
 
-/* A store past the caches. Elsewhere than on x86 there is none that a program can rely on, and nothing uses this. */
-LB_INLINE void lb_store_past(real *p, vec v)
-{
-#if !defined(__SSE2__)
-    lb_store(p, v);
-#elif defined(__clang__)
-    __builtin_nontemporal_store(v, (vec *)(void *)p);
-#else
-    typedef long long words __attribute__((vector_size(sizeof(vec)), may_alias));
-#if defined(__AVX512F__)
-    __builtin_ia32_movntdq512((words *)(void *)p, (words)v);
-#elif defined(__AVX2__)
-    __builtin_ia32_movntdq256((words *)(void *)p, (words)v);
-#else
-    __builtin_ia32_movntdq((words *)(void *)p, (words)v);
-#endif
-#endif
-}
-
 #if defined(__clang__) || __GNUC__ >= 12
 #define LB_SHUFFLE(a, b, ...) __builtin_shufflevector(a, b, __VA_ARGS__)
 #else
@@ -52,20 +33,26 @@ typedef lb_lane_index lanes __attribute__((vector_size(LB_LANES * sizeof(real)))
 
 #if LB_BITS == 64 && LB_LANES == 8
 #define LB_LOW 0, 8, 2, 10, 4, 12, 6, 14
+#define LB_REVERSED 7, 6, 5, 4, 3, 2, 1, 0
 #define LB_HIGH 1, 9, 3, 11, 5, 13, 7, 15
 #elif LB_BITS == 64 && LB_LANES == 4
 #define LB_LOW 0, 4, 2, 6
+#define LB_REVERSED 3, 2, 1, 0
 #define LB_HIGH 1, 5, 3, 7
 #elif LB_BITS == 64
 #define LB_LOW 0, 2
+#define LB_REVERSED 1, 0
 #define LB_HIGH 1, 3
 #elif LB_LANES == 16
+#define LB_REVERSED 15, 14, 13, 12, 11, 10, 9, 8, 7, 6, 5, 4, 3, 2, 1, 0
 #define LB_LOW 0, 16, 1, 17, 4, 20, 5, 21, 8, 24, 9, 25, 12, 28, 13, 29
 #define LB_HIGH 2, 18, 3, 19, 6, 22, 7, 23, 10, 26, 11, 27, 14, 30, 15, 31
 #elif LB_LANES == 8
+#define LB_REVERSED 7, 6, 5, 4, 3, 2, 1, 0
 #define LB_LOW 0, 8, 1, 9, 4, 12, 5, 13
 #define LB_HIGH 2, 10, 3, 11, 6, 14, 7, 15
 #else
+#define LB_REVERSED 3, 2, 1, 0
 #define LB_LOW 0, 4, 1, 5
 #define LB_HIGH 2, 6, 3, 7
 #endif
@@ -80,10 +67,13 @@ LB_INLINE void lb_store_pairs(real *out, vec re, vec im)
 
 #if defined(__clang__)
 #define LB_UNROLL_4 _Pragma("clang loop unroll_count(4)")
+#define LB_UNROLL_8 _Pragma("clang loop unroll_count(8)")
 #elif defined(__GNUC__)
 #define LB_UNROLL_4 _Pragma("GCC unroll 4")
+#define LB_UNROLL_8 _Pragma("GCC unroll 8")
 #else
 #define LB_UNROLL_4
+#define LB_UNROLL_8
 #endif
 
 #if defined(__AVX512VL__) || defined(__aarch64__)

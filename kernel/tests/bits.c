@@ -58,13 +58,13 @@ static int32_t noise(uint32_t *state)
 #include "bits_of_type.h"
 
 /* The hashes of one configuration in both number types: the same for every instruction set and table. */
-static uint64_t every_way(uint32_t window, uint32_t bins, lb_variant variant, uint64_t total)
+static uint64_t every_way(uint32_t window, uint32_t bins, lb_variant variant, uint32_t hop, uint64_t total)
 {
     uint64_t first64 = 0, first32 = 0;
     for (int set = LB_BASELINE; set <= (int)lb_best_instruction_set(); ++set) {
-        for (int table = LB_TABLE_ROWS; table <= LB_TABLE_COMPACT; ++table) {
-            const uint64_t h64 = run64(window, bins, variant, (lb_instruction_set)set, (lb_table)table);
-            const uint64_t h32 = run32(window, bins, variant, (lb_instruction_set)set, (lb_table)table);
+        for (int table = LB_TABLE_ROWS; table <= (hop ? LB_TABLE_ROWS : LB_TABLE_COMPACT); ++table) {
+            const uint64_t h64 = run64(window, bins, variant, (lb_instruction_set)set, (lb_table)table, hop);
+            const uint64_t h32 = run32(window, bins, variant, (lb_instruction_set)set, (lb_table)table, hop);
             const int is_first = set == LB_BASELINE && table == LB_TABLE_ROWS;
             first64 = is_first ? h64 : first64;
             first32 = is_first ? h32 : first32;
@@ -86,7 +86,10 @@ int main(void)
     for (size_t w = 0; w < sizeof windows / sizeof *windows; ++w) {
         for (uint32_t bins = 1; bins <= 35 && bins <= windows[w]; bins += bins < 18 ? 1 : 5) {
             for (int variant = LB_MODULATED; variant <= LB_BLACKMAN; variant += bins % 3 ? 6 : 1) {
-                total = every_way(windows[w], bins, (lb_variant)variant, total);
+                total = every_way(windows[w], bins, (lb_variant)variant, 0, total);
+            }
+            for (uint32_t hop = 1; hop <= windows[w]; ++hop) {
+                total = windows[w] % hop ? total : every_way(windows[w], bins, LB_MODULATED, hop, total);
             }
         }
     }

@@ -16,7 +16,7 @@ static void expect(lb_status got, lb_status want, const char *what)
 #define EXPECT(want, call) expect((call), (want), #call)
 
 static const uint32_t bins[] = {1, 2, 3}, twice[] = {1, 2, 1}, beyond[] = {1, 8};
-static const lb_config good = {8, 2, 3, bins, LB_MODULATED, 0.0, LB_BEST, LB_TABLE_ROWS};
+static const lb_config good = {8, 2, 3, bins, LB_MODULATED, 0.0, LB_BEST, LB_TABLE_ROWS, 0};
 
 static void configurations(void)
 {
@@ -47,6 +47,14 @@ static void configurations(void)
     EXPECT(LB_ERROR_TABLE, lb_sdft64_size(&c, &bytes));
     c = good, c.variant = LB_DAMPED, c.damping = 1.0;
     EXPECT(LB_ERROR_DAMPING, lb_sdft64_size(&c, &bytes));
+    c = good, c.hop = 3;
+    EXPECT(LB_ERROR_HOP, lb_sdft64_size(&c, &bytes));
+    c.hop = 4, c.variant = LB_HANN;
+    EXPECT(LB_ERROR_HOP, lb_sdft64_size(&c, &bytes));
+    c.variant = LB_MODULATED, c.table = LB_TABLE_COMPACT;
+    EXPECT(LB_ERROR_HOP, lb_sdft64_size(&c, &bytes));
+    c.table = LB_TABLE_ROWS;
+    EXPECT(LB_OK, lb_sdft64_size(&c, &bytes));
 }
 
 static void init(void *memory, size_t bytes)
@@ -102,6 +110,26 @@ static void calls(lb_sdft64 *dft)
     EXPECT(LB_ERROR_SNAPSHOT_MAGIC, lb_sdft64_restore(dft, snapshot, bytes));
 }
 
+/* Rows at a hop: bins are looked for twice, and rows at other hops are refused. */
+static void hops(void)
+{
+    double x[16] = {0}, out[2 * 2 * 3 * 2];
+    size_t bytes, rows;
+    lb_sdft64 *dft;
+    lb_config c = good;
+    c.hop = 4;
+    EXPECT(LB_OK, lb_sdft64_size(&c, &bytes));
+    void *memory = malloc(bytes);
+    c.bins = twice;
+    EXPECT(LB_ERROR_BINS, lb_sdft64_init(memory, bytes, &c, &dft));
+    c.bins = bins;
+    EXPECT(LB_OK, lb_sdft64_init(memory, bytes, &c, &dft));
+    EXPECT(LB_ERROR_HOP, lb_sdft64_rows(dft, 8, 2, &rows));
+    EXPECT(LB_ERROR_HOP, lb_sdft64_process(dft, x, 8, 1, 8, 6, LB_PHASE_WINDOW, out, 1));
+    EXPECT(LB_OK, lb_sdft64_process(dft, x, 8, 1, 8, 4, LB_PHASE_WINDOW, out, 2));
+    free(memory);
+}
+
 int main(void)
 {
     size_t bytes;
@@ -117,5 +145,6 @@ int main(void)
     EXPECT(LB_OK, lb_sdft64_init(memory + 1, bytes, &good, &dft));
     calls(dft);
     free(memory);
+    hops();
     return failures != 0;
 }

@@ -50,7 +50,8 @@ def test_the_method_follows_bins_and_hop():
     """Lines of a tracker slide; a full spectrum at a long hop does not."""
     assert not HoppingDFT(400, range(1, 22), hop=20).by_fft
     assert not HoppingDFT(400, range(201), hop=10).by_fft
-    assert HoppingDFT(400, range(201), hop=50).by_fft
+    assert not HoppingDFT(400, range(201), hop=50).by_fft
+    assert HoppingDFT(400, range(201), hop=200).by_fft
     assert HoppingDFT(4096, range(2049), hop=20).by_fft
 
 

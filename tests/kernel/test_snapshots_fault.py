@@ -29,7 +29,7 @@ def advanced(**changes) -> SlidingDFT:
     ],
 )
 def test_a_snapshot_of_another_configuration_is_refused(changes):
-    with pytest.raises(ValueError, match="the snapshot is of another window, bins, channels, dtype or variant"):
+    with pytest.raises(ValueError, match="the snapshot is of another window, bins, channels, dtype, variant or hop"):
         advanced().restore(advanced(**changes).snapshot())
 
 

@@ -90,6 +90,19 @@ def test_every_variant_has_the_bits_of_the_host(target, variant):
     assert len(list(check(target, jobs))) == 4
 
 
+def test_spectra_at_a_hop_have_the_bits_of_the_host(target):
+    """Sample by sample and in blocks, from the beginning, from the middle of a hop, and after a NaN."""
+    jobs = [
+        Job(noise(hop, 333, channels), 120, bins, every * hop, phase, blockwise=blockwise, before=before, own_hop=hop)
+        for hop, every in ((1, 5), (8, 1), (15, 2), (60, 1), (120, 1))
+        for channels, bins, phase in ((1, (0, 7), "window"), (2, tuple(range(1, 22)), "fixed"))
+        for blockwise in (False, True)
+        for before in (np.zeros((0, channels)), noise(9, 131, channels))
+    ]
+    jobs[0].samples[70] = np.nan
+    assert len(list(check(target, jobs))) == 40
+
+
 def test_a_nan_heals_on_the_target(target):
     """What is not finite spoils the same rows as on the host, and none after 2N samples."""
     jobs = []

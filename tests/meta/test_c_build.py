@@ -20,7 +20,7 @@ WARNINGS = ["-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Wpedantic", "-Werr
 # The flags that kernel/flags.cmake sets.
 ALWAYS = ["-ffp-contract=off", "-fno-math-errno"]
 SETS = {"avx2": ["-mavx2", "-mno-fma"], "avx512": ["-mavx512f", "-mavx512vl"]}
-TYPED = ["layout", "rows", "stage", "stream", "read", "recur", "snapshot", "dispatch", "tiles", "one", "tile"]
+TYPED = ["layout", "rows", "stream", "read", "recur", "snapshot", "dispatch", "tiles", "one", "tile", "hops", "hop"]
 INCLUDES = [f"-I{folder}" for folder in (KERNEL / "include", NATIVE / "include")]
 PROGRAMS = {"misuse": KERNEL, "bits": KERNEL, "lines": KERNEL, "matrix": NATIVE, "repeating": NATIVE, "table": NATIVE}
 X86 = os.uname().machine == "x86_64"
@@ -64,6 +64,8 @@ def build(directory: Path, compiler: str, *flags: str, dispatch: bool = X86, spe
         for name, isa in SETS.items() if dispatch else ():
             kernel = f"-DLB_KERNEL_NAME=lb_sdft{bits}_kernel_{name}"
             jobs.append(("tile", f"tile{bits}_{name}", [f"-DLB_BITS={bits}", kernel, *isa]))
+            hops = f"-DLB_HOPS_NAME=lb_sdft{bits}_hops_{name}"
+            jobs.append(("hop", f"hop{bits}_{name}", [f"-DLB_BITS={bits}", hops, *isa]))
 
     def compile_one(job: tuple[str, str, list[str]]) -> Path:
         source, name, extra = job
@@ -141,9 +143,10 @@ def test_wide_objects_use_wide_registers(built):
         pytest.skip("instruction sets are x86-64's")
     for name, register in (("avx2", "ymm"), ("avx512", "zmm")):
         for bits, suffix in ((32, "ps"), (64, "pd")):
-            (file,) = (f for f in built[2] if f.name == f"tile{bits}_{name}.o")
-            assembly = run(needed("objdump"), "-d", file)
-            assert len(re.findall(rf"vmul{suffix} .*%{register}", assembly)) > 20
+            for part in ("tile", "hop"):
+                (file,) = (f for f in built[2] if f.name == f"{part}{bits}_{name}.o")
+                assembly = run(needed("objdump"), "-d", file)
+                assert len(re.findall(rf"vmul{suffix} .*%{register}", assembly)) > 20
         for stage, least in (("rows", 5), ("matrices", 1)):
             (file,) = (f for f in built[2] if f.name == f"{stage}_{name}.o")
             assert len(re.findall(rf"vdivpd .*%{register}", run(needed("objdump"), "-d", file))) > least
@@ -188,9 +191,10 @@ def test_arm_has_vectors_and_the_same_bits(tmp_path):
     objects = build(tmp_path / "objects", compiler, "-O1", dispatch=False)
     assembly = run("aarch64-linux-gnu-objdump", "-d", *objects)
     assert not re.search(r"\bfn?m(la|ls|add|sub)\b", assembly)
-    of_tiles = run("aarch64-linux-gnu-objdump", "-d", *(file for file in objects if file.stem in ("tile32", "tile64")))
+    inner = (file for file in objects if file.stem in ("tile32", "tile64", "hop32", "hop64"))
+    of_rows = run("aarch64-linux-gnu-objdump", "-d", *inner)
     for elements in ("4s", "2d"):
-        assert len(re.findall(rf"fmul\s+v\d+\.{elements}", of_tiles)) > 100
+        assert len(re.findall(rf"fmul\s+v\d+\.{elements}", of_rows)) > 100
     host, _, of_host = as_released("gcc", tmp_path / "of the host")
     (tmp_path / "host").mkdir()
     made = program(tmp_path, compiler, objects, "bits", FEW, "-static", runner=emulator)
@@ -202,8 +206,7 @@ def test_sanitizers_find_nothing(tmp_path):
     sanitize = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
     compiler = needed("gcc")
     # The same statements, and every check in each of them, but no object repeats a function wherever it is called.
-    # Long blocks of rows go past the caches, as else only megabytes of them.
-    flags = ["-Og", "-fno-inline", "-DLB_DEBUG", "-DLB_INLINE=static inline", "-DLB_STAGED_BYTES=8192"]
+    flags = ["-Og", "-fno-inline", "-DLB_DEBUG", "-DLB_INLINE=static inline"]
     objects = build(tmp_path / "objects", compiler, *flags, *sanitize)
     for part in PROGRAMS:
         program(tmp_path, compiler, objects, part, *([FEW] if part == "bits" else []), *sanitize)

@@ -72,5 +72,7 @@ def test_the_count_is_exact_and_the_step_is_cheap(tmp_path):
     assert all(found == 2 * turns + 1 for turns, found in counted.loops.items())
     assert counted.kernel[21, "rows"].sample <= LIMIT
     assert counted.kernel[21, "rows"].worst <= WORST
+    assert counted.kernel[21, "hop"].sample <= 0.65 * counted.kernel[21, "rows"].sample
+    assert counted.kernel[21, "hop"].ram <= 0.4 * counted.kernel[21, "rows"].ram
     assert counted.kernel[21, "compact"].sample <= 1.2 * counted.kernel[21, "rows"].sample
     assert counted.kernel[21, "compact"].ram < counted.kernel[21, "rows"].ram / 4

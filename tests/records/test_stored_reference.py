@@ -53,7 +53,7 @@ def test_its_state_of_an_older_version_is_refused() -> None:
     commit = last_commit(STORED[-1] / "segments")
     assert commit is not None
     assert (commit.sample, commit.events_bytes, commit.waiting) == (650, 263, ())
-    with refused(StateError, "older-version", name="repeating-errors"):
+    with refused(StateError, "older-version", name="line-spectra"):
         Tracker(stored.SETTINGS).restore(commit.states["tracker"])
 
 

@@ -35,12 +35,13 @@ class Job:
     variant: str = "modulated"
     compact: bool = False
     blockwise: bool = False
+    own_hop: int | None = None
     before: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 1)))
     """Samples that the host takes in first; the target goes on from its snapshot."""
 
     def started(self, dtype: str) -> SlidingDFT:
         """The host's kernel after the samples before."""
-        dft = SlidingDFT(self.window, self.bins, self.samples.shape[1], dtype, self.variant)
+        dft = SlidingDFT(self.window, self.bins, self.samples.shape[1], dtype, self.variant, hop=self.own_hop)
         if len(self.before):
             dft.advance(np.ascontiguousarray(self.before.T.astype(dtype)))
         return dft
@@ -51,7 +52,7 @@ class Job:
         phase = ("window", "fixed").index(self.phase)
         head = (
             *(self.window, channels, len(self.bins), VARIANTS.index(self.variant), self.compact, phase),
-            *(self.hop, count, len(snapshot), self.blockwise),
+            *(self.hop, count, len(snapshot), self.blockwise, self.own_hop or 0),
         )
         words = np.array(head + self.bins, dtype="<u4").tobytes()
         return words + snapshot + np.ascontiguousarray(self.samples.astype(dtype)).tobytes()

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from livebode.arrays import Complex, Floats
 from livebode.core import GridError, Lines, Stage, StatefulBase, UsageError
 from livebode.estimation.implausible import PlausibleRange, SpikeGate
-from livebode.kernel import INSTRUCTION_SET_VARIABLE, SlidingDFT, instruction_set, instruction_sets
+from livebode.kernel import INSTRUCTION_SET_VARIABLE, SlidingDFT, instruction_set, instruction_sets, own_hop
 
 _NONE = np.zeros(0, dtype=np.intp)
 _ROW_VALUES_MAX = 1 << 18  # complex numbers of one kernel call: 4 MiB, which fits the cache
@@ -62,7 +62,7 @@ class LineSpectra(StatefulBase):
         Of the samples and of the DFT; what is done to a signal before and after it is in float64.
     """
 
-    _stage = Stage("line-spectra", 1)
+    _stage = Stage("line-spectra", 2)
     _STATE = ("_range", "_spikes", "_next", "_last_bad", "_before", "_started")
 
     def __init__(
@@ -92,7 +92,8 @@ class LineSpectra(StatefulBase):
 
     def _fresh(self) -> SlidingDFT:
         check_instruction_set()
-        return SlidingDFT(self._window, self._bins, channels=self._differenced.size, dtype=self._dtype)
+        hop = own_hop(self._window, self._step)
+        return SlidingDFT(self._window, self._bins, channels=self._differenced.size, dtype=self._dtype, hop=hop)
 
     def restart(self, sample: int) -> None:
         """Forget every sample; the next one has this number."""

@@ -67,3 +67,4 @@ from livebode.kernel._repeating import Tones as Tones
 from livebode.kernel._repeating import judge_periods as judge_periods
 from livebode.kernel._runs import decode_runs as decode_runs
 from livebode.kernel._sliding import SlidingDFT as SlidingDFT
+from livebode.kernel._sliding import own_hop as own_hop

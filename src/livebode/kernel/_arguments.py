@@ -92,6 +92,18 @@ def as_hop(hop: object) -> int:
     return step
 
 
+def as_own_hop(hop: object, window: int, variant: str) -> int:
+    """The hop of a SlidingDFT whose rows are at its multiples only; 0 for None."""
+    if hop is None:
+        return 0
+    step = as_hop(hop)
+    if window % step:
+        raise ValueError(f"{hop=} does not divide {window=}: give a divisor, or leave it out")
+    if variant != "modulated":
+        raise ValueError(f"{hop=} is for variant='modulated' only; leave it out")
+    return step
+
+
 def refuse_phase(phase: object) -> None:
     raise ValueError(f"{phase=} is neither 'window' nor 'fixed'")
 

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from livebode.kernel import _arguments
-from livebode.kernel._sliding import SlidingDFT
+from livebode.kernel._sliding import SlidingDFT, own_hop
 
 _TABLE_BYTES: Final = 16 << 20  # a larger table of twiddle factors is read from memory: three times as slow
 _ROWS: Final = 256  # of an FFT at once, so that they remain in the cache
@@ -19,10 +19,12 @@ def fft_is_cheaper(window: int, bin_count: int, hop: int) -> bool:
     """Whether an FFT of every window takes less time than the sliding DFT of `bin_count` bins.
 
     A bin and sample of the one take as long as a point and stage of the other: K·hop compared with N·log2 N, and three
-    times as long where the table (8·N·K bytes) exceeds 16 MiB (`python -m bench.full_spectrum`).
+    times as long where the table (8·N·K bytes) exceeds 16 MiB. With a hop of its own they take a fifth of it, and a bin
+    and hop five times as long (`python -m bench.full_spectrum`).
     """
-    slower = 3 if 8 * window * bin_count > _TABLE_BYTES else 1
-    return slower * bin_count * hop > window * log2(max(window, 2))
+    own = own_hop(window, hop)
+    time = 0.2 + 5 / own if own else 3 if 8 * window * bin_count > _TABLE_BYTES else 1
+    return time * bin_count * hop > window * log2(max(window, 2))
 
 
 class HoppingDFT:
@@ -30,7 +32,7 @@ class HoppingDFT:
 
     As `SlidingDFT.process(x, hop)`, but by an FFT of every window (NumPy's) where that is cheaper. The error is below
     5e-15 (float64) or 1e-6 (float32) of √N·‖x‖₂ of the window in both cases. The bits are those of the method that is
-    used (`by_fft`): where they must not depend on the hop, use SlidingDFT.
+    used (`by_fft`): where they must be the same on every computer, use SlidingDFT.
 
     Parameters
     ----------
@@ -66,7 +68,8 @@ class HoppingDFT:
         self._dtype = _arguments.as_dtype(dtype)
         self._sliding: SlidingDFT | None = None
         if not fft_is_cheaper(self._window, len(self._bins), self._hop):
-            self._sliding = SlidingDFT(self._window, self._bins, self._channels, self._dtype)
+            own = own_hop(self._window, self._hop)
+            self._sliding = SlidingDFT(self._window, self._bins, self._channels, self._dtype, hop=own)
         self._last = np.zeros((self._channels, self._window), self._dtype)
         self._count = 0
 

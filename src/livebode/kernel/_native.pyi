@@ -126,6 +126,7 @@ class Engine:
         variant: int,
         damping: float,
         instruction_set: int,
+        hop: int,
         /,
     ) -> None: ...
     @property
@@ -139,7 +140,7 @@ class Engine:
     def process(
         self,
         x: npt.ArrayLike,
-        hop: int = 1,
+        hop: int | None = None,
         out: npt.NDArray[np.complexfloating[Any, Any]] | None = None,
         phase: Phase = "window",
     ) -> npt.NDArray[np.complexfloating[Any, Any]]: ...

@@ -29,10 +29,11 @@ const char *words(lb_status status)
     switch (status) {
     case LB_ERROR_INSTRUCTION_SET: return "this machine or this build does not have the instruction set asked for";
     case LB_ERROR_SIZE: return "window × bins needs more memory than this machine can address";
+    case LB_ERROR_HOP: return "hop is not a multiple of that of the SlidingDFT; leave it out for the same";
     case LB_ERROR_SNAPSHOT_LENGTH: return "the snapshot is cut off; take it anew";
     case LB_ERROR_SNAPSHOT_MAGIC: return "these bytes are no snapshot of a SlidingDFT of this version and byte order";
     case LB_ERROR_SNAPSHOT_CONFIG:
-        return "the snapshot is of another window, bins, channels, dtype or variant; restore it into its like";
+        return "the snapshot is of another window, bins, channels, dtype, variant or hop; restore it into its like";
     case LB_ERROR_SNAPSHOT_CRC: return "the snapshot is damaged: its checksum does not fit; take it anew";
     default: return "the kernel refused its arguments";
     }
@@ -73,8 +74,8 @@ struct Samples {
 class Engine {
   public:
     Engine(uint32_t window, const std::vector<uint32_t> &bins, uint32_t channels, bool is_double, int variant,
-           double damping, int set)
-        : window_(window), channels_(channels), bins_(bins.size()), is_double_(is_double)
+           double damping, int set, uint32_t hop)
+        : window_(window), channels_(channels), bins_(bins.size()), hop_(hop), is_double_(is_double)
     {
         const lb_config config = {window,
                                   channels,
@@ -83,7 +84,8 @@ class Engine {
                                   static_cast<lb_variant>(variant),
                                   damping,
                                   static_cast<lb_instruction_set>(set),
-                                  LB_TABLE_ROWS};
+                                  LB_TABLE_ROWS,
+                                  hop};
         size_t bytes = 0;
         expect(is_double ? lb_sdft64_size(&config, &bytes) : lb_sdft32_size(&config, &bytes));
         memory_.reset(new unsigned char[bytes]);
@@ -186,7 +188,7 @@ class Engine {
         "this SlidingDFT is processing a block in another thread; give each thread its own";
 
     uint32_t window_, channels_;
-    size_t bins_;
+    size_t bins_, hop_;
     bool is_double_;
     native::Flag used_;
     std::unique_ptr<unsigned char[]> memory_;
@@ -237,6 +239,7 @@ class Engine {
 
     size_t hop_of(nb::handle hop) const
     {
+        if (hop.is_none()) return hop_ ? hop_ : 1;
         if (PyLong_CheckExact(hop.ptr())) {
             const Py_ssize_t value = PyLong_AsSsize_t(hop.ptr());
             if (value > 0) return static_cast<size_t>(value);
@@ -363,13 +366,13 @@ NB_MODULE(_native, m)
     bind_belt(m);
     bind_table(m);
     nb::class_<Engine>(m, "Engine")
-        .def(nb::init<uint32_t, const std::vector<uint32_t> &, uint32_t, bool, int, double, int>())
+        .def(nb::init<uint32_t, const std::vector<uint32_t> &, uint32_t, bool, int, double, int, uint32_t>())
         .def_prop_ro("window", &Engine::window)
         .def_prop_ro("channels", &Engine::channels)
         .def_prop_ro("count", &Engine::count)
         .def("_instruction_set", &Engine::instruction_set)
         .def("push", &Engine::push)
-        .def("process", &Engine::process, nb::arg("x").none(), nb::arg("hop").none() = 1, nb::arg("out") = nb::none(),
+        .def("process", &Engine::process, nb::arg("x").none(), nb::arg("hop") = nb::none(), nb::arg("out") = nb::none(),
              nb::arg("phase").none() = "window")
         .def("advance", &Engine::advance)
         .def("spectrum", &Engine::spectrum, nb::arg("phase").none() = "window")

@@ -17,7 +17,7 @@ typedef lb_sdft32 dft_type;
 #define BINS_MAX 128
 
 typedef struct {
-    uint32_t window, channels, bin_count, variant, table, phase, hop, samples, snapshot_bytes, blockwise;
+    uint32_t window, channels, bin_count, variant, table, phase, hop, samples, snapshot_bytes, blockwise, own_hop;
 } header;
 
 static unsigned char memory[1 << 20], snapshot[1 << 17];
@@ -69,6 +69,7 @@ static void play(const header *h, int in, int out)
         .variant = (lb_variant)h->variant,
         .damping = 0.9999,
         .table = (lb_table)h->table,
+        .hop = h->own_hop,
     };
     dft_type *dft;
     size_t bytes;

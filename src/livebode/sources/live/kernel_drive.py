@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from livebode.core import NOT_WHOLE, Block, SpectraLayout
 from livebode.estimation import Centre, check_instruction_set
-from livebode.kernel import SlidingDFT
+from livebode.kernel import SlidingDFT, own_hop
 from livebode.sources.live.spectra_batch import SpectraBatch
 
 
@@ -32,7 +32,8 @@ class KernelDrive:
     def __init__(self, layout: SpectraLayout, dtype: str = "float32") -> None:
         self._layout, self._dtype = layout, np.dtype(dtype)
         check_instruction_set()
-        self._dft = SlidingDFT(layout.window, list(layout.bins), channels=len(layout.signals), dtype=dtype)
+        hop = own_hop(layout.window, layout.hop)
+        self._dft = SlidingDFT(layout.window, list(layout.bins), channels=len(layout.signals), dtype=dtype, hop=hop)
         self._centres = [Centre(layout.window) for _ in layout.values]
         self._next, self._last_bad = 0, -1
         self._before: NDArray[np.float64] | None = None
