@@ -95,11 +95,11 @@ $(VENV)/.bench: $(BUILT) requirements-bench.lock
 	touch $@
 
 bench: $(VENV)/.bench $(BUNDLE)  ## side by side with what a user would pick instead
+	$(BIN)/python -m bench.felt
+	$(BIN)/python -m bench.start
 	$(BIN)/python -m bench
-	$(BIN)/python -m bench.dense_bound
-	$(BIN)/python -m bench.large_rows
+	$(BIN)/python -m bench.hop_rows
 	$(BIN)/python -m bench.full_spectrum
-	$(BIN)/python -m bench --job
 	$(BIN)/python -m bench.tracking
 	$(BIN)/python -m bench.fits
 	$(BIN)/python -m bench.mimo
@@ -112,7 +112,6 @@ bench: $(VENV)/.bench $(BUNDLE)  ## side by side with what a user would pick ins
 	$(BIN)/python -m bench.live_blocks
 	$(BIN)/python -m bench.overload
 	$(BIN)/python -m bench.segments
-	$(BIN)/python -m bench.start
 	$(BIN)/python -m bench.dashboard
 	$(BIN)/python -m bench.page
 	$(BIN)/python -m bench.readers

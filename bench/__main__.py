@@ -1,14 +1,17 @@
 """`python -m bench`: the kernel compared with its alternatives, all in one run.
 
-With --long: the error over 1e9 samples; with --accuracy: the error of the named variants; with --job: the complete
-command; with --record: the cost of a record in segments. With --json FILE: kernel and complete command, stored with
-version and environment (bench/history has one file for each release).
+With --long: the error over 1e9 samples; with --accuracy: the error of the named variants; with --record: the cost of a
+record in segments. With --json FILE: kernel and what a person waits for, stored with version and environment
+(bench/history has one file for each release).
 """
 
 import argparse
 import json
 import os
 import platform
+import subprocess
+import sys
+import tempfile
 import time
 from pathlib import Path
 from typing import Any
@@ -48,14 +51,9 @@ def main() -> None:
         "--accuracy", action="store_true", help="measure the error of the named variants, instead of speed"
     )
     parser.add_argument(
-        "--job", action="store_true", help="measure the complete command `livebode run`, instead of the kernel"
-    )
-    parser.add_argument(
         "--record", action="store_true", help="measure the cost of a record in segments, instead of the kernel"
     )
-    parser.add_argument(
-        "--json", type=Path, metavar="FILE", help="measure kernel and complete command, and store the figures here"
-    )
+    parser.add_argument("--json", type=Path, metavar="FILE", help="store here what bench.felt and the kernel measure")
     parser.add_argument("--seconds", type=float, default=0.5, help="duration per contender and cell")
     parser.add_argument("--sets", nargs="+", default=list(instruction_sets()[1:]) or list(instruction_sets()))
     options = parser.parse_args()
@@ -67,11 +65,6 @@ def main() -> None:
         name, result = "long", dict(long_run(int(options.samples)))
     elif options.accuracy:
         name, result = "accuracy", dict(accuracy())
-    elif options.job:
-        from bench import job
-
-        name, result = "job", dict(job.measure())
-        job.report(result)
     elif options.record:
         from bench import record
 
@@ -88,13 +81,12 @@ def main() -> None:
 
 def store(path: Path, seconds: float, sets: list[str]) -> None:
     """Measure what a release's figures are, and write them."""
-    from bench import job
-
-    # First the command: the peak memory of a child includes that of the process it was forked from.
-    command = job.measure()
-    job.report(command)
-    kernel = speed(seconds, sets)
-    document = history.document([*history.of_kernel(kernel), *history.of_job(command)], processor())
+    with tempfile.TemporaryDirectory() as folder:  # in a process of its own, whose memory is not that of this one
+        rows = Path(folder) / "rows.json"
+        subprocess.run([sys.executable, "-m", "bench.felt", "--json", str(rows)], check=True)
+        felt = json.loads(rows.read_text(encoding="utf-8"))
+    figures = [*history.of_felt(felt), *history.of_kernel(speed(seconds, sets))]
+    document = history.document(figures, processor())
     path.write_text(json.dumps(document, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
     print(f"written to {path}")
 

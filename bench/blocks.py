@@ -63,6 +63,5 @@ def measure(seconds: float) -> list[dict[str, Any]]:
             few = signal(window + hop * (SLOW_ROWS - 1))
             slow = side_by_side({name: make(few, window, bins, hop) for name, make in SLOW.items()}, 0.0)
             best |= {name: t * ROWS / SLOW_ROWS for name, t in slow.items()}
-            best["numba"] = min(best["numba complex"], best["numba planar"])
             records.append({"kind": kind, "window": window, "bins": len(bins), "seconds": best})
     return records

@@ -2,7 +2,7 @@
 
 The machine sends half a second of samples, pauses, sends again, and so on; its clock is accelerated, so the pauses take
 no time. Every pause is a loss of samples, hence an event and an alarm, and is followed by a new segment. After a year
-the run has as many segments, events and alarms as one whose segments are two hours long.
+the run has as many segments, events and alarms as one whose segments are four hours long.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from bench.monitoring_live import RATE_HZ
 
 HOUR_S, DAY_S, MONTH_S, YEAR_S = 3600.0, 86400.0, 30 * 86400.0, 365 * 86400.0
 AGES_S = {"1 h": HOUR_S, "1 day": DAY_S, "1 month": MONTH_S, "1 year": YEAR_S}
-STAGES = ((HOUR_S, 7.5), (DAY_S, 300.0), (MONTH_S, 3600.0), (YEAR_S, 7200.0))
+STAGES = ((HOUR_S, 15.0), (DAY_S, 600.0), (MONTH_S, 7200.0), (YEAR_S, 14400.0))
 """Until this age, in seconds, one burst each so many seconds."""
 BURST = 20  # batches
 SEGMENT_S = 5.0  # less than each pause

@@ -46,16 +46,9 @@ def of_kernel(result: dict[str, Any]) -> list[Figure]:
     return found
 
 
-def of_job(result: dict[str, float]) -> list[Figure]:
-    """The complete command on ten minutes of samples, and its ratios to SciPy."""
-    found = [
-        figure(f"livebode run, ten minutes: {key.removesuffix('_s')}", result[key], "s")
-        for key in ("command_s", "run_s", "tracking_s", "start_s")
-    ]
-    for key, theirs in (("stft_s", "ShortTimeFFT"), ("rfft_s", "sliding rfft")):
-        label = f"livebode run, ten minutes, compared with {theirs}"
-        found.append(figure(label, result[key] / result["command_s"], "×", "more"))
-    return [*found, figure("livebode run, ten minutes: peak memory", result["peak_mib"], "MiB")]
+def of_felt(rows: list[Any]) -> list[Figure]:
+    """What a person waits for, and the scripts of SciPy, from the JSON of `python -m bench.felt`."""
+    return [figure(what, value, unit) for what, figures in rows for value, unit, _ in figures]
 
 
 def processor_family(model: str) -> str:

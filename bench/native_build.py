@@ -34,7 +34,7 @@ def empty() -> ModuleType:
 
 
 def peers() -> ctypes.CDLL:
-    """The C functions of rls.c, frf.c and traffic.c."""
+    """The C functions of rls.c and frf.c."""
     (path,) = BUILD.glob("libpeers.*")
     library = ctypes.CDLL(str(path))
     signal, count = ctypes.c_void_p, ctypes.c_size_t
@@ -47,5 +47,4 @@ def peers() -> ctypes.CDLL:
     library.frf_new.argtypes = [ctypes.c_uint32, ctypes.c_uint32, ctypes.c_void_p, ctypes.c_int]
     library.frf_new.restype = ctypes.c_void_p
     library.frf_free.argtypes = [ctypes.c_void_p]
-    library.dense_traffic.argtypes = [signal, count, count, signal, count, count]
     return library

@@ -47,7 +47,7 @@ def main() -> None:
         processes = Processes(Path(folder))
         for _ in range(ROUNDS + 1):  # the first writes the bytecode
             for name, (command, environment, code) in PROGRAMS.items():
-                times[name].append(processes.run(*command, environment=environment, code=code)[0])
+                times[name].append(processes.run(*command, environment=environment, codes=[code]).processor_s)
     medians = {name: statistics.median(values[1:]) for name, values in times.items()}
     for name, median in medians.items():
         ratio = median / medians[PYTHON]

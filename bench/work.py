@@ -25,25 +25,25 @@ def signal(samples: int) -> Array:
 def side_by_side(tasks: Mapping[str, Callable[[], object]], seconds: float) -> dict[str, float]:
     """Measure the best time of each, in seconds.
 
-    They take turns, so that a busy neighbour hits all alike, and it is processor time, for none of them has threads. A
-    turn is a few calls in a row of which the first is not counted: each works on its own reused buffers, as in a loop
-    that does nothing else.
+    They take turns, and it is the least wall time of many short calls: a neighbour interrupts some of them, while the
+    clock of the processor time reads too little on a shared computer. A turn is a few calls in a row of which the first
+    is not counted: each works on its own reused buffers, as in a loop that does nothing else.
     """
     best = dict.fromkeys(tasks, np.inf)
     calls = {}
     for name, task in tasks.items():
         task()
-        started = time.process_time()
+        started = time.perf_counter()
         task()
-        calls[name] = max(2, int(500e-6 / max(time.process_time() - started, 1e-9)))
-    end = time.process_time() + seconds * len(tasks)
+        calls[name] = max(2, int(500e-6 / max(time.perf_counter() - started, 1e-9)))
+    end = time.perf_counter() + seconds * len(tasks)
     rounds = 0
-    while time.process_time() < end or rounds < 2:
+    while time.perf_counter() < end or rounds < 2:
         rounds += 1
         for name, task in tasks.items():
             task()
             for _ in range(calls[name]):
-                started = time.process_time()
+                started = time.perf_counter()
                 task()
-                best[name] = min(best[name], time.process_time() - started)
+                best[name] = min(best[name], time.perf_counter() - started)
     return best

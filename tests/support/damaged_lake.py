@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from datetime import UTC, date, datetime, timedelta
 from functools import partial
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -37,9 +38,7 @@ def make_lake(folder: Path) -> Lake:
             elif table.key:
                 lake.add_rows(name, own)
             else:
-                file = write_data_file(folder, name, key, [own])
-                lake.store(folder / file.name, name)
-                lake.add_files(name, [file])
+                lake.add_files(name, [write_data_file(lake, name, key, own)])
         if number == 1:
             compact(lake)
             for name in ("responses", "fleet_events", "files"):
@@ -124,9 +123,10 @@ def check_lake(
     return "log" if file.startswith("_delta_log") else "data file", bool(after[table].sentence)
 
 
-def write_data_file(folder: Path, table: str, key: Key, parts: Iterable[pa.Table]) -> DataFile:
-    """Write the rows of one result, without the key's columns, to a file in this directory; none if it has no rows."""
-    with ResultFileWriter(folder, table, key) as writer:
-        for part in parts:
-            writer.write(part)
-        return writer.finish()
+def write_data_file(lake: Lake, table: str, key: Key, rows: pa.Table) -> DataFile:
+    """Put the rows of one result, without the key's columns, in the directory of a table."""
+    with TemporaryDirectory() as folder, ResultFileWriter(Path(folder), table, key) as writer:
+        writer.write(rows)
+        file = writer.finish()
+        lake.store(file, writer.content)
+    return file

@@ -53,17 +53,15 @@ def test_processes_that_add_the_same_rows_at_the_same_time_add_them_once(lake: L
     assert sorted(lake.read("runs")["content"].to_pylist()) == [key.content for key in KEYS]
 
 
-def test_a_file_that_is_added_twice_is_read_once(lake: Lake, tmp_path: Path) -> None:
-    file = write_data_file(tmp_path, "events", KEYS[0], [events()])
+def test_a_file_that_is_added_twice_is_read_once(lake: Lake) -> None:
     for one in (lake, Lake(lake.url)):
-        one.store(tmp_path / file.name, "events")
-        one.add_files("events", [file])
+        one.add_files("events", [write_data_file(one, "events", KEYS[0], events())])
     assert lake.read("events").num_rows == 3
 
 
-def test_a_file_of_a_result_that_counts_is_not_added(lake: Lake, tmp_path: Path) -> None:
+def test_a_file_of_a_result_that_counts_is_not_added(lake: Lake) -> None:
     lake.add_rows("runs", rows("runs", KEYS[0]))
-    lake.add_files("events", [write_data_file(tmp_path, "events", KEYS[0], [events()])])
+    lake.add_files("events", [write_data_file(lake, "events", KEYS[0], events())])
     assert lake.read("events").num_rows == 0
 
 
@@ -81,20 +79,18 @@ def test_a_damaged_table_is_an_error_that_names_it(lake: Lake) -> None:
     assert caught.value.code == "archive.lake-damaged"
 
 
-def test_a_filter_on_any_column_finds_its_rows(lake: Lake, tmp_path: Path) -> None:
+def test_a_filter_on_any_column_finds_its_rows(lake: Lake) -> None:
     own = {**KEYS[0]._asdict(), "model": "two-mass", "name": "Keff", "value": 2.0}
     lake.add_rows("quantities", pa.Table.from_pylist([own], schema=TABLES["quantities"].schema))
     assert lake.read("quantities", ["value"], pc.field("name") == "Keff")["value"].to_pylist() == [2.0]
     assert lake.read("quantities", ["value"], pc.field("site").is_null()).num_rows == 1
-    file = write_data_file(tmp_path, "events", KEYS[0], [events()])
-    lake.store(tmp_path / file.name, "events")
-    lake.add_files("events", [file])
+    lake.add_files("events", [write_data_file(lake, "events", KEYS[0], events())])
     assert lake.read("events", where=pc.field("kind") == "gap").num_rows == 3
     assert lake.read("events", where=pc.field("content") == KEYS[1].content).num_rows == 0
 
 
 @pytest.mark.parametrize("name", ["runs", "responses"])
-def test_compaction_retains_the_values_of_every_row(lake: Lake, tmp_path: Path, name: str) -> None:
+def test_compaction_retains_the_values_of_every_row(lake: Lake, name: str) -> None:
     schema = TABLES[name].schema
     newest = schema.names[-1]
     for number, key in enumerate(KEYS[:2]):
@@ -103,9 +99,7 @@ def test_compaction_retains_the_values_of_every_row(lake: Lake, tmp_path: Path, 
         if TABLES[name].key:
             lake.add_rows(name, own)
         else:
-            file = write_data_file(tmp_path, name, key, [own])
-            lake.store(tmp_path / file.name, name)
-            lake.add_files(name, [file])
+            lake.add_files(name, [write_data_file(lake, name, key, own)])
     lake.add_rows("runs", rows("runs", *KEYS[:2]))  # what does not count is not joined
     written = sorted(lake.read(name, [newest])[newest].to_pylist())
     assert len(written) == 2

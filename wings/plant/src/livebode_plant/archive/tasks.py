@@ -129,14 +129,14 @@ class LakeRecord(RecordInOnePiece):
     Parameters
     ----------
     path
-        An existing directory for the files: PATH/TABLE/NAME.
+        An existing directory for files of several groups of rows.
     key
         The result.
 
     Attributes
     ----------
     files
-        The files with rows, when the run is finished.
+        The files with rows and what each contains (`DataFileWriter.content`), when the run is finished.
     fitted
         The valid fits.
     summary
@@ -145,7 +145,7 @@ class LakeRecord(RecordInOnePiece):
 
     def __init__(self, path: Path, key: Key) -> None:
         self.path, self._key = path, key
-        self.files: tuple[DataFile, ...] = ()
+        self.files: dict[DataFile, bytes | Path] = {}
         self.fitted = FittedQuantities()
         self.summary: dict[str, Any] = {}
         self._events: list[Event] = []
@@ -181,13 +181,12 @@ class LakeRecord(RecordInOnePiece):
         self.summary = summary
         with writing(self.path):
             self._write_events()
-            written = [writer.finish() for writer in self._writers.values()]
-        self.files = tuple(file for file in written if file.rows)
+            written = {writer.finish(): writer.content for writer in self._writers.values()}
+        self.files = {file: content for file, content in written.items() if file.rows}
 
     def _write(self, table: str, rows: pa.Table) -> None:
         if table not in self._writers:
-            (self.path / table).mkdir()
-            self._writers[table] = self._open.enter_context(ResultFileWriter(self.path / table, table, self._key))
+            self._writers[table] = self._open.enter_context(ResultFileWriter(self.path, table, self._key))
         self._writers[table].write(rows)
 
     def _write_events(self) -> None:
@@ -230,10 +229,10 @@ def track(job: Job, place: RecordingPlace, path: Path, key: Key, scratch: Path |
         record = LakeRecord(Path(folder), key)
         run(axis, Destination(Path(folder), _no_pictures, record=record))
         lake = Lake(job.lake)
-        for file in record.files:
-            lake.store(Path(folder) / file.table / file.name, file.table)
+        for file, content in record.files.items():
+            lake.store(file, content)
     common = key._asdict() | levels
-    return TrackedResult(record.files, common | _about(record, place), tuple(_quantities(axis, record, common)))
+    return TrackedResult(tuple(record.files), common | _about(record, place), tuple(_quantities(axis, record, common)))
 
 
 def _no_pictures(*_: object) -> None:

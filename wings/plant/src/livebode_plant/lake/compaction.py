@@ -63,7 +63,7 @@ def _compacted(lake: Lake, name: str) -> CompactionResult | None:
             for part in parts:
                 writer.write(part)
             file = writer.finish()
-            lake.store(Path(folder) / file.name, name)
+            lake.store(file, writer.content)
             return [file]
 
     with lake.reported(name):

@@ -18,7 +18,6 @@ import pyarrow.parquet as pq
 from deltalake import CommitProperties, DeltaTable, Transaction
 from deltalake.transaction import AddAction, RemoveAction
 
-from livebode.core import replace_file
 from livebode.tables import text
 from livebode_plant.lake.schemas import TABLES
 from livebode_plant.lake.wide_responses import wide_options
@@ -104,32 +103,39 @@ class DataFile:
 
 
 class DataFileWriter:
-    """Writes rows, as they come, to a file in this directory. A context manager.
+    """Writes rows, as they come, to a file of a table. A context manager.
 
-    Row groups have a bounded size, and follow from the rows alone.
+    Row groups have a bounded size, and follow from the rows alone. A file of one group is never on the disk.
 
     Parameters
     ----------
     folder
-        An existing directory.
+        An existing directory for a file of several groups.
     table
         Of the lake.
     of
         What it contains: `DataFile.of`.
+
+    Attributes
+    ----------
+    content
+        The bytes of the file, or its path, when it is finished.
     """
 
     def __init__(self, folder: Path, table: str, of: str) -> None:
-        self._path, self._table, self._of = folder / f"{of}.partial", table, of
+        self._path, self._table, self._of = folder / f"{table}.parquet", table, of
         self._schema = TABLES[table].schema
-        self._writer = parquet_writer(self._path, self._schema)
+        self._writer: pq.ParquetWriter | None = None
         self._waiting: list[pa.Table] = []
         self._waiting_bytes = self._rows = 0
+        self.content: bytes | Path = self._path
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *error: object) -> None:
-        self._writer.close()
+        if self._writer is not None:
+            self._writer.close()
 
     def write(self, rows: pa.Table) -> None:
         """Append rows; a column that they lack is null."""
@@ -137,23 +143,30 @@ class DataFileWriter:
         self._rows += rows.num_rows
         self._waiting_bytes += rows.nbytes
         if self._waiting_bytes >= _GROUP_BYTES:
-            self._flush()
+            if self._writer is None:
+                self._writer = parquet_writer(self._path, self._schema)
+            self._flush(self._writer)
 
     def finish(self) -> DataFile:
-        """Complete the file, and give it its name."""
-        self._flush()
-        self._writer.close()
-        with self._path.open("rb") as written:
-            name = _named(self._of, hashlib.file_digest(written, "sha256").hexdigest())
-        path = self._path.with_name(name)
-        replace_file(self._path, path)
-        return DataFile(self._table, name, path.stat().st_size, self._rows)
+        """Complete the file, and name it."""
+        if self._writer is None:
+            buffer = pa.BufferOutputStream()
+            with parquet_writer(buffer, self._schema) as writer:
+                self._flush(writer)
+            self.content = content = buffer.getvalue().to_pybytes()
+            size_bytes, sha256 = len(content), hashlib.sha256(content).hexdigest()
+        else:
+            self._flush(self._writer)
+            self._writer.close()
+            with self._path.open("rb") as written:
+                size_bytes, sha256 = self._path.stat().st_size, hashlib.file_digest(written, "sha256").hexdigest()
+        return DataFile(self._table, _named(self._of, sha256), size_bytes, self._rows)
 
-    def _flush(self) -> None:
+    def _flush(self, writer: pq.ParquetWriter) -> None:
         if self._waiting:
             whole = pa.concat_tables(self._waiting)
             self._waiting, self._waiting_bytes = [], 0
-            self._writer.write_table(whole, row_group_size=max(whole.num_rows, 1))
+            writer.write_table(whole, row_group_size=max(whole.num_rows, 1))
 
 
 class ResultFileWriter(DataFileWriter):
@@ -174,7 +187,8 @@ class ResultFileWriter(DataFileWriter):
 
 def _column(rows: pa.Table, field: pa.Field[Any]) -> Any:
     if field.name in rows.column_names:
-        return rows[field.name].cast(field.type)
+        column = rows[field.name]
+        return column if column.type == field.type else column.cast(field.type)
     return pa.nulls(rows.num_rows, field.type)
 
 

@@ -220,25 +220,28 @@ class Lake(TableContent):
                 if self.commit(name, *new):
                     return True
 
-    def store(self, path: Path, table: str) -> None:
-        """Put a file in the directory of a table, completely or not at all.
+    def store(self, file: DataFile, content: bytes | Path) -> None:
+        """Put a file, of these bytes or those at a path, in the directory of its table, completely or not at all.
 
         Raises
         ------
         ArchiveError, LocationError
             If it cannot be written.
         """
-        target = self.place_of(table) / path.name
+        target = self.place_of(file.table) / file.name
         if isinstance(target, Path):
-            with self.reported(table):
+            with self.reported(file.table):
                 target.parent.mkdir(parents=True, exist_ok=True)
                 with whole_file(target) as partial:
-                    shutil.copyfile(path, partial)
+                    partial.write_bytes(content) if isinstance(content, bytes) else shutil.copyfile(content, partial)
             return
         system, inside = opened(target)
         with reporting(target):
             make_parent(target, system, inside)
-            system.put_file(str(path), inside)
+            if isinstance(content, bytes):
+                system.pipe_file(inside, content)
+            else:
+                system.put_file(str(content), inside)
 
     def commit(
         self,
