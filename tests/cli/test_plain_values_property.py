@@ -56,3 +56,10 @@ def test_a_usual_number_is_plain(text: str) -> None:
 def test_a_path_that_is_checked_is_left_to_typer(option: str) -> None:
     with pytest.raises(NotPlainError):
         plain_value("missing", Path, typer.models.OptionInfo(**{option: True}))  # type: ignore[arg-type]
+
+
+def test_a_parser_is_used_and_what_it_refuses_is_left_to_typer() -> None:
+    info = typer.models.ArgumentInfo(parser=int)
+    assert plain_value(("1", "2"), list[Path], info) == _of_typer(("1", "2"), list[Path], info) == [1, 2]
+    with pytest.raises(NotPlainError):
+        plain_value("many", Path, info)

@@ -27,11 +27,11 @@ def plain_value(value: Any, annotation: Any, info: Any) -> Any:
     info
         Typer's description of it, with its limits.
     """
-    if info.parser is not None:
-        raise NotPlainError
     if get_origin(annotation) is list and isinstance(value, list | tuple):
         (inner,) = get_args(annotation)
         return [plain_value(one, inner, info) for one in value]
+    if info.parser is not None:
+        return _parsed(value, info)
     if annotation is str and isinstance(value, str):
         return value
     if annotation is bool and isinstance(value, bool):
@@ -41,6 +41,13 @@ def plain_value(value: Any, annotation: Any, info: Any) -> Any:
     if annotation in (int, float) and type(value) in (str, annotation):
         return _number(value, annotation, info)
     raise NotPlainError
+
+
+def _parsed(value: Any, info: Any) -> Any:
+    try:
+        return info.parser(value)
+    except Exception as error:  # Typer meets it too, and words it
+        raise NotPlainError from error
 
 
 def _path(path: Path, info: Any) -> Path:
