@@ -29,7 +29,11 @@ class TomlSchema(GenerateJsonSchema):
     def default_schema(self, schema: Any) -> Schema:
         """With its default, if JSON can express it; that of a table is in the table's keys."""
         default = self.get_default_value(schema)
-        if default is None or isinstance(default, BaseModel | TypedTable) or (isinstance(default, float) and not isfinite(default)):
+        if (
+            default is None
+            or isinstance(default, BaseModel | TypedTable)
+            or (isinstance(default, float) and not isfinite(default))
+        ):
             return self.generate_inner(schema["schema"])
         return super().default_schema(schema)
 
