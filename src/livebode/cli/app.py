@@ -230,7 +230,7 @@ def _fail(error: Exception) -> None:
     if disk_full(error):
         _discard_output()
     failure = failure_of(error)
-    from livebode.records import to_json  # loads Arrow and pydantic, which not every command needs
+    from livebode.records import to_json  # not every command needs what it loads
 
     _stop(to_json({"error": failure.error}) if json_requested() else failure.text, failure.exit_code)
 
