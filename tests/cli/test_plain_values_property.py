@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from typer._coercion import build_runtime_param, resolve_type_descriptor
 
-from livebode.cli.plain_values import NotPlainError, plain_value
+from livebode.cli.plain_values import LeftToTyperError, plain_value
 
 LIMITS = st.none() | st.integers(-1000, 1000)
 NUMBERS = st.integers().map(str) | st.floats().map(str) | st.from_regex(r"\A[-+ 0-9._e,x]{0,9}\Z")
@@ -40,7 +40,7 @@ def test_a_plain_value_is_that_of_typer(case: tuple[Any, Any], low: int | None, 
     info = typer.models.OptionInfo(min=low, max=high)
     try:
         plain = plain_value(value, annotation, info)
-    except NotPlainError:
+    except LeftToTyperError:
         return
     other = _of_typer(value, annotation, info)
     assert plain == other
@@ -54,12 +54,12 @@ def test_a_usual_number_is_plain(text: str) -> None:
 
 @pytest.mark.parametrize("option", ["exists", "resolve_path", "writable", "allow_dash"])
 def test_a_path_that_is_checked_is_left_to_typer(option: str) -> None:
-    with pytest.raises(NotPlainError):
+    with pytest.raises(LeftToTyperError):
         plain_value("missing", Path, typer.models.OptionInfo(**{option: True}))  # type: ignore[arg-type]
 
 
 def test_a_parser_is_used_and_what_it_refuses_is_left_to_typer() -> None:
     info = typer.models.ArgumentInfo(parser=int)
     assert plain_value(("1", "2"), list[Path], info) == _of_typer(("1", "2"), list[Path], info) == [1, 2]
-    with pytest.raises(NotPlainError):
+    with pytest.raises(LeftToTyperError):
         plain_value("many", Path, info)

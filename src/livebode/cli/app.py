@@ -23,7 +23,7 @@ from livebode.cli.commands import ABOUT, OPTIONS, Command
 from livebode.cli.failures import disk_full, failure_of, json_requested, name_options, unparsed
 from livebode.cli.log_options import File, Level, LogOptions, logged
 from livebode.cli.next_step import NextCommand
-from livebode.cli.plain_values import NotPlainError, plain_value
+from livebode.cli.plain_values import LeftToTyperError, plain_value
 from livebode.cli.remote import with_copies
 from livebode.cli.terminal import print_page, protect
 from livebode.core import DamageWarning, LivebodeError, needing
@@ -77,7 +77,7 @@ def _processed(parameter: Any, process: Callable[[Any, Any], Any], context: Any,
         described = parameter.type_descriptor
         try:
             plain = plain_value(value, described.annotation, described.parameter_info)
-        except NotPlainError:
+        except LeftToTyperError:
             return process(context, value)
         if several and not plain and parameter.required:
             return process(context, value)

@@ -11,12 +11,12 @@ _WHOLE = re.compile(r"[+-]?[0-9]{1,15}")
 _DECIMAL = re.compile(r"[+-]?[0-9]{1,15}([.][0-9]{1,15})?(e[+-]?[0-9]{1,2})?")
 
 
-class NotPlainError(ValueError):
+class LeftToTyperError(ValueError):
     """A value that Typer has to convert or to refuse."""
 
 
 def plain_value(value: Any, annotation: Any, info: Any) -> Any:
-    """What Typer makes of a value; NotPlainError if it is not text, a switch, a path or a number in the usual form.
+    """What Typer makes of a value; LeftToTyperError if it is not text, a switch, a path or a number in the usual form.
 
     Parameters
     ----------
@@ -40,29 +40,29 @@ def plain_value(value: Any, annotation: Any, info: Any) -> Any:
         return _path(Path(value), info)
     if annotation in (int, float) and type(value) in (str, annotation):
         return _number(value, annotation, info)
-    raise NotPlainError
+    raise LeftToTyperError
 
 
 def _parsed(value: Any, info: Any) -> Any:
     try:
         return info.parser(value)
     except Exception as error:  # Typer meets it too, and words it
-        raise NotPlainError from error
+        raise LeftToTyperError from error
 
 
 def _path(path: Path, info: Any) -> Path:
     checked = (info.exists, info.resolve_path, info.writable, info.allow_dash, info.path_type)
     if any(checked) or not (info.file_okay and info.dir_okay):
-        raise NotPlainError
+        raise LeftToTyperError
     if info.readable and not os.access(path, os.R_OK) and os.path.lexists(path):
-        raise NotPlainError
+        raise LeftToTyperError
     return path
 
 
 def _number(value: Any, kind: type, info: Any) -> Any:
     if isinstance(value, str) and not (_WHOLE if kind is int else _DECIMAL).fullmatch(value):
-        raise NotPlainError
+        raise LeftToTyperError
     number = kind(value)
     if info.clamp or not (info.min is None or number >= info.min) or not (info.max is None or number <= info.max):
-        raise NotPlainError
+        raise LeftToTyperError
     return number

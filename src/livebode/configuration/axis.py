@@ -23,7 +23,6 @@ from livebode.configuration.ready import ReadyCondition, ready_condition
 from livebode.configuration.report_section import ReportSection, report_error
 from livebode.configuration.section import ConfigurationSection
 from livebode.configuration.toml_file import one_line, read_table, shortened
-from livebode.configuration.toml_mistakes import meant_value
 from livebode.core import ConfigError, Field, TypedTable, errors_of, nearest_name
 from livebode.estimates import MATRIX, RESPONSE, rule
 from livebode.sources import live
@@ -256,6 +255,8 @@ def _of_one_recording(axis: Axis) -> list[str]:
 
 def _first_of(error: ValueError) -> ConfigError:
     """The first error, with its key and value; missing keys last, because a misspelt key also causes a missing one."""
+    from livebode.configuration.toml_mistakes import meant_value  # needed for a mistake only
+
     first = min(errors_of(error), key=_is_less_helpful)
     if first["loc"][:1] == ("report",):
         return report_error(first)

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from livebode.configuration.section import ConfigurationSection, File, Positive
-from livebode.core import LEVELS, Field, TypedTable, UsageError, Validation
+from livebode.core import LEVELS, Field, TypedTable, UsageError, ValueCheck
 
 if TYPE_CHECKING:
     from livebode.motion import Shaft
@@ -25,7 +25,7 @@ def _checked(name: str) -> str:
 
 
 Level = Annotated[
-    str, Field(max_length=_LETTERS_MAX), Validation(_checked), Field(json_schema_extra={"pattern": _PATTERN})
+    str, Field(max_length=_LETTERS_MAX), ValueCheck(_checked), Field(json_schema_extra={"pattern": _PATTERN})
 ]
 
 

@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 from urllib.parse import urlsplit
 
 from livebode.configuration.section import ConfigurationSection, File
-from livebode.core import ConfigError, Field, Validation, nearest_name
+from livebode.core import ConfigError, Field, ValueCheck, nearest_name
 from livebode.plugins import named
 
 NAMES = ("axis", "machine", "run", "kind", "priority", "message", "time", "sample", "value", "unit")
@@ -150,7 +150,7 @@ class PublishSection(ConfigurationSection):
     events: list[Events] | None = None
     values: list[Part] | None = None
     interval_s: Annotated[float, Field(ge=0.1, le=86400)] = 10.0
-    template: Annotated[str, Validation(check_template)] | None = None
+    template: Annotated[str, ValueCheck(check_template)] | None = None
     timeout_s: Annotated[float, Field(ge=0.1, le=300)] = 10.0
     group_s: Annotated[float, Field(ge=0, le=86400)] = 60.0
     sender: str | None = None

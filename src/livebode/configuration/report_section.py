@@ -9,8 +9,7 @@ from typing import Annotated, Any, Literal
 
 from livebode.configuration.section import ConfigurationSection, File, Language
 from livebode.configuration.toml_file import one_line, read_table, shortened
-from livebode.configuration.toml_mistakes import meant_value
-from livebode.core import ConfigError, Field, Paper, Validation, errors_of, nearest_name
+from livebode.core import ConfigError, Field, Paper, ValueCheck, errors_of, nearest_name
 
 LIMITS_MAX = 50
 MARGIN_UNITS = {
@@ -53,7 +52,7 @@ class LimitSection(ConfigurationSection):
         Lowest and highest frequency of a magnitude, in Hz. Default: all lines.
     """
 
-    quantity: Annotated[str, Validation(_known_quantity)]
+    quantity: Annotated[str, ValueCheck(_known_quantity)]
     min: float | None = None
     max: float | None = None
     band_hz: Annotated[list[float], Field(min_length=2, max_length=2)] | None = None
@@ -140,6 +139,8 @@ def read_template(path: Path) -> ReportSection:
 
 def report_error(first: Mapping[str, Any]) -> ConfigError:
     """An error of pydantic in a [report], with the nearest name for an unknown one."""
+    from livebode.configuration.toml_mistakes import meant_value  # needed for a mistake only
+
     loc = first["loc"][1:] if first["loc"][:1] == ("report",) else first["loc"]
     place = one_line(".".join(["report", *map(str, loc)]))
     if first["type"] == "extra_forbidden":

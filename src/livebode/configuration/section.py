@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-from livebode.core import Field, TypedTable, Validation
+from livebode.core import Field, TypedTable, ValueCheck
 from livebode.language import available
 
 
@@ -16,7 +16,7 @@ def _known_language(code: str) -> str:
 
 
 File = Annotated[Path, Field(strict=False)]
-Language = Annotated[str, Validation(_known_language)]
+Language = Annotated[str, ValueCheck(_known_language)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
 

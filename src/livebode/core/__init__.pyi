@@ -150,7 +150,7 @@ from livebode.core.typed_table import Field as Field
 from livebode.core.typed_table import TypedTable as TypedTable
 from livebode.core.typed_table import errors_of as errors_of
 from livebode.core.typed_values import Conversion as Conversion
-from livebode.core.typed_values import Validation as Validation
+from livebode.core.typed_values import ValueCheck as ValueCheck
 from livebode.core.write_errors import not_written as not_written
 from livebode.core.write_errors import output_files as output_files
 from livebode.core.write_errors import why as why

@@ -12,7 +12,7 @@ from pydantic import AfterValidator, BaseModel, Field, PlainValidator, TypeAdapt
 from pydantic_core import core_schema
 
 from livebode.core.typed_table import TypedTable, fields_of
-from livebode.core.typed_values import REQUIRED, Conversion, NotPlainError, Specification, Validation
+from livebode.core.typed_values import REQUIRED, Conversion, NotPlainError, Specification, ValueCheck
 
 # One for all: a model that is built builds those that it contains, and axes and requests of the dashboard are threads.
 _building = threading.RLock()
@@ -73,7 +73,7 @@ def _standard(kind: Any) -> Any:
 def _annotations(given: Any) -> list[Any]:
     if isinstance(given, Specification):
         return [Field(**given.limits)]
-    if isinstance(given, Validation):
+    if isinstance(given, ValueCheck):
         return [AfterValidator(given.function)]
     if isinstance(given, Conversion):
         return [PlainValidator(given.function), WithJsonSchema({"type": "string", "format": given.format})]

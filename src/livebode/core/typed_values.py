@@ -36,7 +36,7 @@ class Specification:
         self.default, self.alias, self.limits = default, alias, limits
 
 
-class Validation(NamedTuple):
+class ValueCheck(NamedTuple):
     """A function that checks and may change a value of the type before it, as of pydantic's `AfterValidator`."""
 
     function: Callable[[Any], Any]
@@ -96,7 +96,7 @@ def _annotated(kind: Any, value: Any, lax: bool) -> Any:
     lax = lax or any(isinstance(each, Specification) and each.limits.get("strict") is False for each in specified)
     value = plain_value(base, value, lax)
     for each in specified:
-        if isinstance(each, Validation):
+        if isinstance(each, ValueCheck):
             value = _by(each.function, value)
         elif not isinstance(each, Specification) or not _fulfils(value, each.limits):
             raise NotPlainError

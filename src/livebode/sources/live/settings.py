@@ -17,7 +17,7 @@ from livebode.core import (
     QuantityKind,
     TypedTable,
     UsageError,
-    Validation,
+    ValueCheck,
 )
 from livebode.locations import Location, Url, location
 from livebode.plugins import loaded, named
@@ -100,7 +100,7 @@ def _checked_limit(given: float | str) -> float | str:
     return given
 
 
-Limit = Annotated[float | Annotated[str, Field(json_schema_extra={"pattern": PATTERN})], Validation(_checked_limit)]
+Limit = Annotated[float | Annotated[str, Field(json_schema_extra={"pattern": PATTERN})], ValueCheck(_checked_limit)]
 
 
 def _checked_units(units: dict[str, str]) -> dict[str, str]:
@@ -177,7 +177,7 @@ class SourceKeys(TypedTable, extra="forbid", strict=True, allow_inf_nan=False):
     fields: dict[str, str] = {}
     sample_field: str | None = None
     kinds: dict[str, QuantityKind] = {}
-    units: Annotated[dict[str, str], Validation(_checked_units)] = {}
+    units: Annotated[dict[str, str], ValueCheck(_checked_units)] = {}
 
     @property
     def live(self) -> bool:
