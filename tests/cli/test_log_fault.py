@@ -110,7 +110,7 @@ def test_a_disk_that_takes_no_log_line_costs_the_line_and_one_sentence(
 
 
 def test_a_log_file_is_of_bounded_size(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("livebode.cli.log_output.FILE_BYTES_MAX", 10_000)
+    monkeypatch.setattr("livebode.cli.log_file.FILE_BYTES_MAX", 10_000)
     log = logging.getLogger("livebode.test")
     with log_output("info", tmp_path / "own.log"):
         for number in range(1000):

@@ -6,8 +6,6 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
-
 from livebode.analysis._margins import CONTRADICTED, Margins, against_lines, peak_sensitivity_at_lines, worst
 from livebode.analysis.fits import by_place
 from livebode.analysis.margin_reading import margins
@@ -51,7 +49,7 @@ def checked_loop(directory: Path, section: LoopSection, entry: tuple[str, str] |
         of = LoopSection.model_validate(without_null(stored["loop"]))
         if entry is not None:
             of, stored = of.of_controller(*entry), stored["controllers"]["/".join(entry)]
-    except (ValidationError, AttributeError, KeyError, TypeError):
+    except (ValueError, AttributeError, KeyError, TypeError):
         return CHANGED
     return CheckedLoop(str(stored.get("verdict")), str(stored["sentence"])) if of == section else CHANGED
 

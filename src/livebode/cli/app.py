@@ -23,6 +23,7 @@ from livebode.cli.commands import ABOUT, OPTIONS, Command
 from livebode.cli.failures import disk_full, failure_of, json_requested, name_options, unparsed
 from livebode.cli.log_options import File, Level, LogOptions, logged
 from livebode.cli.next_step import NextCommand
+from livebode.cli.plain_values import LeftToTyperError, plain_value
 from livebode.cli.remote import with_copies
 from livebode.cli.terminal import print_page, protect
 from livebode.core import DamageWarning, LivebodeError, needing
@@ -60,17 +61,27 @@ class _Light:
 
 
 def _leave_missing(parameters: Iterable[Any]) -> None:
-    """Pass by what was not given: Typer would build the pydantic model of each option to convert None."""
+    """Pass by what was not given or is plain: Typer would build a model of pydantic for each option."""
     for parameter in parameters:
         if "process_value" not in vars(parameter):
             parameter.process_value = partial(_processed, parameter, parameter.process_value)
 
 
 def _processed(parameter: Any, process: Callable[[Any, Any], Any], context: Any, value: Any) -> Any:
-    if value is not None or (parameter.required and not context.resilient_parsing):
-        return process(context, value)
-    missing = () if parameter.multiple or parameter.nargs == -1 else None
-    return missing if parameter.callback is None else parameter.callback(context, parameter, missing)
+    several = parameter.multiple or parameter.nargs == -1
+    if value is None:
+        if parameter.required and not context.resilient_parsing:
+            return process(context, value)
+        plain: Any = () if several else None
+    else:
+        described = parameter.type_descriptor
+        try:
+            plain = plain_value(value, described.annotation, described.parameter_info)
+        except LeftToTyperError:
+            return process(context, value)
+        if several and not plain and parameter.required:
+            return process(context, value)
+    return plain if parameter.callback is None else parameter.callback(context, parameter, plain)
 
 
 class _Command(_Light, TyperCommand):
@@ -219,7 +230,7 @@ def _fail(error: Exception) -> None:
     if disk_full(error):
         _discard_output()
     failure = failure_of(error)
-    from livebode.records import to_json  # loads Arrow and pydantic, which not every command needs
+    from livebode.records import to_json  # not every command needs what it loads
 
     _stop(to_json({"error": failure.error}) if json_requested() else failure.text, failure.exit_code)
 

@@ -7,14 +7,11 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from logging.handlers import RotatingFileHandler
 from pathlib import Path
 
 from livebode.cli.frames import visible
 from livebode.core import not_written
 
-FILE_BYTES_MAX = 16 << 20
-"""A file that has so many bytes is renamed to NAME.1, in the place of the one before."""
 LOGGER = "livebode"
 
 
@@ -48,18 +45,6 @@ class _StderrHandler(logging.StreamHandler):  # type: ignore[type-arg]
     def emit(self, record: logging.LogRecord) -> None:
         self.stream = sys.stderr
         super().emit(record)
-
-
-class _FileHandler(RotatingFileHandler):
-    """A file of bounded size. Lines that cannot be written are lost; standard error gets one sentence about it."""
-
-    _failed = False
-
-    def handleError(self, record: logging.LogRecord) -> None:  # noqa: ARG002, N802
-        """Without a traceback for each line: the run is worth more than its log."""
-        if not self._failed:
-            self._failed = True
-            print(f"livebode: the log file {self.baseFilename} cannot be written; lines are lost", file=sys.stderr)
 
 
 @contextmanager
@@ -99,7 +84,9 @@ def warnings_shown() -> Iterator[None]:
 
 
 def _opened(file: Path) -> logging.Handler:
+    from livebode.cli.log_file import LogFile  # loads the sockets of other handlers
+
     try:
-        return _FileHandler(file, maxBytes=FILE_BYTES_MAX, backupCount=1, encoding="utf-8", errors="backslashreplace")
+        return LogFile(file)
     except OSError as error:
         raise not_written(file, error, unchanged=False) from None

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ast
 import inspect
+import re
 from collections.abc import Callable, Mapping
 from functools import cache, wraps
 from importlib.util import find_spec
@@ -98,8 +99,12 @@ def _keys(section: str) -> dict[str, SectionKey]:
     spec = find_spec(module)
     assert spec is not None
     assert spec.origin is not None
-    tree = ast.parse(Path(spec.origin).read_text(encoding="utf-8"))
-    (declared,) = (node for node in tree.body if isinstance(node, ast.ClassDef) and node.name == name)
+    text = re.search(
+        rf"^class {name}\b.*?(?=^\S|\Z)", Path(spec.origin).read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE
+    )
+    assert text is not None
+    (declared,) = ast.parse(text[0]).body
+    assert isinstance(declared, ast.ClassDef)
     texts = documented(ast.get_docstring(declared) or "")
     fields = [node for node in declared.body if isinstance(node, ast.AnnAssign)]
     return dict(_key(field, texts) for field in fields if isinstance(field.target, ast.Name))

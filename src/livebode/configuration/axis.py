@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
-
-from pydantic import BaseModel, Field, ValidationError
-from pydantic_core import ErrorDetails
 
 from livebode.configuration.fit_section import FitSection
 from livebode.configuration.loop_section import LoopSection
@@ -25,8 +23,7 @@ from livebode.configuration.ready import ReadyCondition, ready_condition
 from livebode.configuration.report_section import ReportSection, report_error
 from livebode.configuration.section import ConfigurationSection
 from livebode.configuration.toml_file import one_line, read_table, shortened
-from livebode.configuration.toml_mistakes import meant_value
-from livebode.core import ConfigError, nearest_name
+from livebode.core import ConfigError, Field, TypedTable, errors_of, nearest_name
 from livebode.estimates import MATRIX, RESPONSE, rule
 from livebode.sources import live
 from livebode.sources.live import SourceSettings
@@ -117,7 +114,7 @@ class Axis(ConfigurationSection):
         """The Axis in plain data; `origin` names it in messages."""
         try:
             axis = cls.model_validate(data)
-        except ValidationError as error:
+        except ValueError as error:
             raise _first_of(error).at(origin) from None
         if sum(named is not None for named in (axis.source.log, axis.source.url, axis.source.replay)) != 1:
             raise ConfigError(
@@ -213,7 +210,7 @@ def read_loop(path: Path) -> LoopSection:
     return _with(path, _LoopOnly, "loop").loop
 
 
-Only = TypeVar("Only", bound=BaseModel)
+Only = TypeVar("Only", bound=TypedTable)
 
 
 def _with(path: Path, only: type[Only], name: str) -> Only | Axis:
@@ -223,7 +220,7 @@ def _with(path: Path, only: type[Only], name: str) -> Only | Axis:
         return Axis.of(data, str(path))
     try:
         return only.model_validate(data)
-    except ValidationError as error:
+    except ValueError as error:
         raise _first_of(error).at(str(path)) from None
 
 
@@ -256,9 +253,11 @@ def _of_one_recording(axis: Axis) -> list[str]:
     return [key for key, there in given.items() if there]
 
 
-def _first_of(error: ValidationError) -> ConfigError:
+def _first_of(error: ValueError) -> ConfigError:
     """The first error, with its key and value; missing keys last, because a misspelt key also causes a missing one."""
-    first = min(error.errors(include_url=False), key=_is_less_helpful)
+    from livebode.configuration.toml_mistakes import meant_value  # needed for a mistake only
+
+    first = min(errors_of(error), key=_is_less_helpful)
     if first["loc"][:1] == ("report",):
         return report_error(first)
     # After a union, pydantic adds the name of the type that it tried.
@@ -276,7 +275,7 @@ def _first_of(error: ValidationError) -> ConfigError:
     return ConfigError("value-invalid", f"{place} = {value} is not usable: {why}", remedy, **facts)
 
 
-def _is_less_helpful(error: ErrorDetails) -> tuple[bool, bool]:
+def _is_less_helpful(error: Mapping[str, Any]) -> tuple[bool, bool]:
     """Whether others are reported first: of a list that may also be a text, those on the list."""
     return error["type"] == "missing", error["type"] == "string_type" and isinstance(error["input"], list)
 
@@ -292,17 +291,17 @@ def nearest(loc: tuple[int | str, ...]) -> str:
     return nearest_name(str(loc[-1]), _names(_section_at(loc[:-1])), "Settings")
 
 
-def _names(section: type[BaseModel]) -> list[str]:
+def _names(section: type[TypedTable]) -> list[str]:
     return [field.alias or name for name, field in section.model_fields.items()]
 
 
-def _section_at(loc: tuple[int | str, ...]) -> type[BaseModel]:
-    section: type[BaseModel] = Axis
+def _section_at(loc: tuple[int | str, ...]) -> type[TypedTable]:
+    section: type[TypedTable] = Axis
     for part in (part for part in loc if isinstance(part, str)):
         annotation: Any = section.model_fields[part].annotation
         section = next(
             c
             for c in (annotation, *getattr(annotation, "__args__", ()))
-            if isinstance(c, type) and issubclass(c, BaseModel)
+            if isinstance(c, type) and issubclass(c, TypedTable)
         )
     return section

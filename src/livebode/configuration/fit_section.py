@@ -6,11 +6,9 @@ import re
 from collections.abc import Iterator, Sequence
 from typing import Annotated, Any, Literal, NamedTuple
 
-from pydantic import Field
-
 from livebode import fitting
 from livebode.configuration.section import ConfigurationSection, Positive
-from livebode.core import SI_UNITS, ConfigError, PlantKinds, UsageError
+from livebode.core import SI_UNITS, ConfigError, Field, PlantKinds, UsageError
 from livebode.language import Message
 from livebode.plugins import named
 

@@ -5,11 +5,9 @@ from __future__ import annotations
 from math import inf
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from pydantic import Field
-
 from livebode import core
 from livebode.configuration.section import ConfigurationSection, Positive
-from livebode.core import CHANNELS_MAX, ConfigError, UsageError, counted
+from livebode.core import CHANNELS_MAX, ConfigError, Field, UsageError, counted
 
 if TYPE_CHECKING:
     from livebode.core import Loop, Model

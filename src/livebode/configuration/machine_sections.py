@@ -5,10 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
-
 from livebode.configuration.section import ConfigurationSection, File, Positive
-from livebode.core import LEVELS, UsageError
+from livebode.core import LEVELS, Field, TypedTable, UsageError, ValueCheck
 
 if TYPE_CHECKING:
     from livebode.motion import Shaft
@@ -27,11 +25,11 @@ def _checked(name: str) -> str:
 
 
 Level = Annotated[
-    str, Field(max_length=_LETTERS_MAX), AfterValidator(_checked), Field(json_schema_extra={"pattern": _PATTERN})
+    str, Field(max_length=_LETTERS_MAX), ValueCheck(_checked), Field(json_schema_extra={"pattern": _PATTERN})
 ]
 
 
-class MachineSection(BaseModel):
+class MachineSection(TypedTable, extra="forbid", strict=True):
     """[machine]: which machine it is. Runs of one machine are compared and searched by it; every level may be omitted.
 
     Parameters
@@ -45,8 +43,6 @@ class MachineSection(BaseModel):
     axis
         The axis of that machine. Default, in a file with [axes.NAME]: NAME.
     """
-
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
     site: Level = ""
     line: Level = ""

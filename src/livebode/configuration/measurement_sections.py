@@ -5,10 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, Field
-
 from livebode.configuration.section import ConfigurationSection, Positive
-from livebode.core import CHANNELS_MAX, WINDOW_MAX, ConfigError, Quantity
+from livebode.core import CHANNELS_MAX, WINDOW_MAX, ConfigError, Field, Quantity, ValueCheck
 
 
 def _one_or_several(names: str | list[str]) -> str | list[str]:
@@ -18,7 +16,7 @@ def _one_or_several(names: str | list[str]) -> str | list[str]:
 
 Channel = Annotated[str, Field(min_length=1)]
 Channels = Annotated[
-    Channel | Annotated[list[Channel], Field(min_length=1, max_length=CHANNELS_MAX)], AfterValidator(_one_or_several)
+    Channel | Annotated[list[Channel], Field(min_length=1, max_length=CHANNELS_MAX)], ValueCheck(_one_or_several)
 ]
 
 

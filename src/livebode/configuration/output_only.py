@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from pydantic import BaseModel
-
-from livebode.core import ConfigError
+from livebode.core import ConfigError, TypedTable
 
 _USED = {
     "signals": {"outputs", "schedule"},
@@ -14,9 +12,9 @@ _USED = {
 _USED_WHOLE = {"source", "output_only", "serve", "machine"}
 
 
-def check_output_only(axis: BaseModel) -> None:
+def check_output_only(axis: TypedTable) -> None:
     """ConfigError if an axis with [output_only] sets something that only a response has, or has a live source."""
-    source: BaseModel = axis.source  # type: ignore[attr-defined]
+    source: TypedTable = axis.source  # type: ignore[attr-defined]
     if source.live:  # type: ignore[attr-defined]
         raise ConfigError(
             "key-conflict",
@@ -27,7 +25,7 @@ def check_output_only(axis: BaseModel) -> None:
     unused = ["source.skip_periods"] if "skip_periods" in source.model_fields_set else []
     for name in sorted(axis.model_fields_set - _USED_WHOLE):
         section = getattr(axis, name)
-        if name in _USED and isinstance(section, BaseModel):
+        if name in _USED and isinstance(section, TypedTable):
             fields = type(section).model_fields
             unused += [f"{name}.{fields[key].alias or key}" for key in sorted(section.model_fields_set - _USED[name])]
         elif section is not None:

@@ -5,9 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-from pydantic import Field
-
 from livebode.configuration.section import ConfigurationSection, File, Language
+from livebode.core import Field
 
 BUDGET_BYTES_MIN = 16 << 20
 

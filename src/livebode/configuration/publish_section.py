@@ -9,10 +9,8 @@ from string import Formatter
 from typing import Annotated, Literal
 from urllib.parse import urlsplit
 
-from pydantic import AfterValidator, Field
-
 from livebode.configuration.section import ConfigurationSection, File
-from livebode.core import ConfigError, nearest_name
+from livebode.core import ConfigError, Field, ValueCheck, nearest_name
 from livebode.plugins import named
 
 NAMES = ("axis", "machine", "run", "kind", "priority", "message", "time", "sample", "value", "unit")
@@ -152,7 +150,7 @@ class PublishSection(ConfigurationSection):
     events: list[Events] | None = None
     values: list[Part] | None = None
     interval_s: Annotated[float, Field(ge=0.1, le=86400)] = 10.0
-    template: Annotated[str, AfterValidator(check_template)] | None = None
+    template: Annotated[str, ValueCheck(check_template)] | None = None
     timeout_s: Annotated[float, Field(ge=0.1, le=300)] = 10.0
     group_s: Annotated[float, Field(ge=0, le=86400)] = 60.0
     sender: str | None = None

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
-from pydantic import BaseModel, ValidationError
-
 from livebode.configuration.fit_section import FitSection
 from livebode.configuration.loop_section import LoopSection
 from livebode.configuration.machine_sections import MachineSection
 from livebode.configuration.report_section import ReportSection
-from livebode.core import RecordError
+from livebode.core import RecordError, TypedTable, errors_of
 
-_SECTIONS: dict[str, type[BaseModel]] = {
+_SECTIONS: dict[str, type[TypedTable]] = {
     "fit": FitSection, "loop": LoopSection, "report": ReportSection, "machine": MachineSection,
 }  # fmt: skip
 
@@ -32,8 +30,8 @@ def recorded_configuration(summary: dict[str, Any]) -> dict[str, Any]:
     for name, section in _SECTIONS.items():
         try:
             section.model_validate(found.get(name, {}))
-        except ValidationError as error:
-            wrong = error.errors()[0]
+        except ValueError as error:
+            wrong = errors_of(error)[0]
             place = ".".join(map(str, (name, *wrong["loc"])))
             raise RecordError(
                 "unexpected-content",

@@ -7,12 +7,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, Field, ValidationError, model_validator
-
 from livebode.configuration.section import ConfigurationSection, File, Language
 from livebode.configuration.toml_file import one_line, read_table, shortened
-from livebode.configuration.toml_mistakes import meant_value
-from livebode.core import ConfigError, Paper, nearest_name
+from livebode.core import ConfigError, Field, Paper, ValueCheck, errors_of, nearest_name
 
 LIMITS_MAX = 50
 MARGIN_UNITS = {
@@ -55,13 +52,13 @@ class LimitSection(ConfigurationSection):
         Lowest and highest frequency of a magnitude, in Hz. Default: all lines.
     """
 
-    quantity: Annotated[str, AfterValidator(_known_quantity)]
+    quantity: Annotated[str, ValueCheck(_known_quantity)]
     min: float | None = None
     max: float | None = None
     band_hz: Annotated[list[float], Field(min_length=2, max_length=2)] | None = None
 
-    @model_validator(mode="after")
-    def _possible(self) -> LimitSection:
+    def check(self) -> None:
+        """ValueError if the limit is not possible."""
         if self.min is None and self.max is None:
             raise ValueError(f"the limit of {self.quantity} needs min, max or both")
         if self.min is not None and self.max is not None and self.min >= self.max:
@@ -70,7 +67,6 @@ class LimitSection(ConfigurationSection):
             raise ValueError(f"band_hz applies to {', '.join(MAGNITUDES)}, not to {self.quantity}")
         if self.band_hz is not None and not 0 <= self.band_hz[0] <= self.band_hz[1]:
             raise ValueError(f"band_hz of {self.quantity} is not two ascending frequencies")
-        return self
 
 
 class ReportSection(ConfigurationSection):
@@ -137,12 +133,14 @@ def read_template(path: Path) -> ReportSection:
         raise ConfigError("key-missing", f"{str(path)!r} has no [report] section", "add it", key="report")
     try:
         return ReportSection.model_validate(table).beside(path.parent)
-    except ValidationError as error:
-        raise report_error(error.errors(include_url=False)[0]).at(str(path)) from None
+    except ValueError as error:
+        raise report_error(errors_of(error)[0]).at(str(path)) from None
 
 
 def report_error(first: Mapping[str, Any]) -> ConfigError:
     """An error of pydantic in a [report], with the nearest name for an unknown one."""
+    from livebode.configuration.toml_mistakes import meant_value  # needed for a mistake only
+
     loc = first["loc"][1:] if first["loc"][:1] == ("report",) else first["loc"]
     place = one_line(".".join(["report", *map(str, loc)]))
     if first["type"] == "extra_forbidden":

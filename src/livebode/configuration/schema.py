@@ -11,9 +11,10 @@ from pydantic.json_schema import GenerateJsonSchema
 from livebode.configuration.axes import AXES_MAX, NAME, SUCCESSOR
 from livebode.configuration.axis import Axis
 from livebode.configuration.descriptions import descriptions, summary
+from livebode.core import TypedTable
 from livebode.language import available
 from livebode.plugins import named
-from livebode.sources.live import EVERY, LOG, SourceSettings
+from livebode.sources.live import EVERY, LOG
 
 Schema = dict[str, Any]
 
@@ -28,7 +29,11 @@ class TomlSchema(GenerateJsonSchema):
     def default_schema(self, schema: Any) -> Schema:
         """With its default, if JSON can express it; that of a table is in the table's keys."""
         default = self.get_default_value(schema)
-        if default is None or isinstance(default, BaseModel) or (isinstance(default, float) and not isfinite(default)):
+        if (
+            default is None
+            or isinstance(default, BaseModel | TypedTable)
+            or (isinstance(default, float) and not isfinite(default))
+        ):
             return self.generate_inner(schema["schema"])
         return super().default_schema(schema)
 
@@ -48,7 +53,7 @@ class TomlSchema(GenerateJsonSchema):
         found.pop("title", None)
         for name, text in descriptions(kind).items():
             found["properties"][name]["description"] = text
-        return found | {"description": summary(kind)} | _EXTRA.get(kind, dict)()
+        return found | {"description": summary(kind)} | _EXTRA.get(kind.__name__, dict)()
 
 
 def schema_of(model: type[BaseModel], file: str) -> Schema:
@@ -119,4 +124,4 @@ def _source() -> Schema:
     return {"not": {"required": ["log", "url"]}, "allOf": [*kinds, growing, replaying]}
 
 
-_EXTRA = {SourceSettings: _source}
+_EXTRA = {"SourceSettings": _source}

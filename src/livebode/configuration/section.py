@@ -5,9 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-from pydantic import AfterValidator, ConfigDict, Field
-
-from livebode.core import DeferredModel
+from livebode.core import Field, TypedTable, ValueCheck
 from livebode.language import available
 
 
@@ -18,12 +16,9 @@ def _known_language(code: str) -> str:
 
 
 File = Annotated[Path, Field(strict=False)]
-Language = Annotated[str, AfterValidator(_known_language)]
+Language = Annotated[str, ValueCheck(_known_language)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
 
-class ConfigurationSection(DeferredModel):
+class ConfigurationSection(TypedTable, extra="forbid", strict=True, allow_inf_nan=False):
     """A table that accepts its own keys only, each with its own type."""
-
-    # Deferred: the sections are built again inside of `Axis`, half of the time of its import.
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import codecs
 import re
-import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -52,6 +51,8 @@ def parse_table(data: bytes, origin: str) -> dict[str, Any]:
             path=origin,
             limit_bytes=FILE_BYTES_MAX,
         )
+    import tomllib  # not of a run without a configuration
+
     try:
         text = _decoded(data)
         if any(part.count(".") > _PARTS_MAX for part in _BETWEEN_KEYS.split(_QUOTED.sub("", text))):
@@ -93,6 +94,8 @@ def meant_line(line: str) -> str | None:
 
 
 def _is_toml(line: str) -> bool:
+    import tomllib
+
     try:
         tomllib.loads(line)
     except ValueError:

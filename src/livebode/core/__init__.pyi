@@ -52,7 +52,6 @@ from livebode.core.controllers import Cascade as Cascade
 from livebode.core.controllers import DriveTiming as DriveTiming
 from livebode.core.controllers import PositionPD as PositionPD
 from livebode.core.controllers import integral as integral
-from livebode.core.deferred_model import DeferredModel as DeferredModel
 from livebode.core.distributions import CIRCLE_FACTOR as CIRCLE_FACTOR
 from livebode.core.distributions import COVERAGE as COVERAGE
 from livebode.core.distributions import INTERVAL_FACTOR as INTERVAL_FACTOR
@@ -147,6 +146,11 @@ from livebode.core.state import decode as decode
 from livebode.core.state import encode as encode
 from livebode.core.state import restore_parts as restore_parts
 from livebode.core.steps import step_of as step_of
+from livebode.core.typed_table import Field as Field
+from livebode.core.typed_table import TypedTable as TypedTable
+from livebode.core.typed_table import errors_of as errors_of
+from livebode.core.typed_values import Conversion as Conversion
+from livebode.core.typed_values import ValueCheck as ValueCheck
 from livebode.core.write_errors import not_written as not_written
 from livebode.core.write_errors import output_files as output_files
 from livebode.core.write_errors import why as why

@@ -10,7 +10,6 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
-import secrets
 import stat
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -163,7 +162,7 @@ def _created(path: Path, locked: bool) -> Iterator[tuple[Path, int]]:
 
 
 def _partial(path: Path, locked: bool) -> Path:
-    return path.with_name(f".{path.name[:_NAME_MAX]}.partial" + ("" if locked else f"-{secrets.token_hex(4)}"))
+    return path.with_name(f".{path.name[:_NAME_MAX]}.partial" + ("" if locked else f"-{os.urandom(4).hex()}"))
 
 
 def _move(partial: Path, path: Path) -> None:

@@ -13,9 +13,9 @@ from livebode.dashboard.board import Pulse as Pulse
 from livebode.dashboard.browser_socket import BrowserSocket as BrowserSocket
 from livebode.dashboard.browser_socket import serve_browser as serve_browser
 from livebode.dashboard.dashboard import Dashboard as Dashboard
-from livebode.dashboard.dashboard import listening as listening
 from livebode.dashboard.guard import upload as upload
 from livebode.dashboard.hub import Hub as Hub
+from livebode.dashboard.listening_socket import listening as listening
 from livebode.dashboard.overlays import grid_hz as grid_hz
 from livebode.dashboard.past import Past as Past
 from livebode.dashboard.plugin_pages import Answer as Answer

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import errno
 import logging
 import socket
 import threading
@@ -15,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Self
 from livebode.core import RecordError, ServerError, not_installed
 from livebode.dashboard.access import Access
 from livebode.dashboard.hub import Hub
+from livebode.dashboard.listening_socket import listening
 from livebode.dashboard.matrix_group import MatrixGroup, MatrixHub
 from livebode.dashboard.run_feed import RunFeed, views_of
 from livebode.dashboard.server_settings import ServerSettings
@@ -24,11 +24,6 @@ if TYPE_CHECKING:
     from livebode.dashboard.plugin_pages import PluginPages, WorkspacePages
 
 HEADER_BYTES_MAX = 16 << 10
-BACKLOG = 4096
-"""Connections that the system queues until they are accepted; a client that finds no room retries a second later."""
-UNREAD_BYTES = 64 << 10
-"""Part of an answer that the system buffers for a client that does not read; else it takes megabytes, and the requests
-behind the first one are answered too, at the expense of others."""
 _START_S = 30.0
 _END_S = 2
 _logger = logging.getLogger(__name__)
@@ -238,35 +233,3 @@ class Dashboard:
             await self._application(scope, receive, send)
         except Exception as error:
             self._faults.report(error)
-
-
-def listening(serving: ServerSettings) -> socket.socket:
-    """A socket that listens where the dashboard is to be."""
-    family = socket.AF_INET6 if ":" in serving.address else socket.AF_INET
-    server = socket.socket(family, socket.SOCK_STREAM)
-    try:
-        server.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        server.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, UNREAD_BYTES)  # accepted connections inherit it
-        server.bind((serving.address, serving.port))
-        server.listen(BACKLOG)
-        server.setblocking(False)
-    except OSError as error:
-        server.close()
-        if error.errno == errno.EADDRINUSE:
-            raise ServerError(
-                "port-taken",
-                f"port {serving.port} is taken",
-                "choose another port, or 0 for a free one",
-                argument="port",
-                port=serving.port,
-            ) from None
-        raise ServerError(
-            "cannot-listen",
-            f"{serving.address} port {serving.port} cannot be listened on: {error.strerror}",
-            "choose an address of this computer and a port that you may use",
-            argument="port",
-            address=serving.address,
-            port=serving.port,
-            errno=error.errno,
-        ) from None
-    return server

@@ -5,7 +5,6 @@ from __future__ import annotations
 import ipaddress
 import os
 import shlex
-import ssl
 import stat
 from dataclasses import dataclass
 from pathlib import Path
@@ -155,9 +154,11 @@ def _tls(section: ServeSection) -> tuple[Path, Path] | None:
                 key=f"serve.{name}",
                 path=str(path),
             )
+    import ssl
+
     try:
         ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER).load_cert_chain(certificate, key, password="")
-    except (ssl.SSLError, OSError, ValueError) as error:
+    except (OSError, ValueError) as error:
         raise ConfigError(
             "file-unusable",
             f"{certificate} and {key} are not a certificate and its key in PEM: {error}",

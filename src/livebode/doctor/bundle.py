@@ -16,10 +16,8 @@ from importlib.metadata import distributions
 from pathlib import Path
 from typing import Any, get_args
 
-from pydantic import BaseModel
-
 from livebode.configuration import MAY_BE_SECRET, Axis, FileKind
-from livebode.core import LivebodeError
+from livebode.core import LivebodeError, TypedTable
 from livebode.doctor.check import Check, worst
 from livebode.doctor.subject import Subject
 from livebode.export import save
@@ -82,17 +80,17 @@ class Secrets:
             text = text.replace(removed, REMOVED)
         return text
 
-    def _section(self, table: Any, model: type[BaseModel]) -> Any:
+    def _section(self, table: Any, model: type[TypedTable]) -> Any:
         if isinstance(table, list):
             return [self._section(item, model) for item in table]
         if not isinstance(table, Mapping):
             return self._removed(table)
         return self._fields(table, model)
 
-    def _fields(self, table: Mapping[str, Any], model: type[BaseModel]) -> dict[str, Any]:
+    def _fields(self, table: Mapping[str, Any], model: type[TypedTable]) -> dict[str, Any]:
         return {key: self._field(key, value, model) for key, value in table.items()}
 
-    def _field(self, key: str, value: Any, model: type[BaseModel]) -> Any:
+    def _field(self, key: str, value: Any, model: type[TypedTable]) -> Any:
         field = model.model_fields.get(key)
         if field is None:
             return self._removed(value) if _SECRET_NAME.search(key) else REMOVED
@@ -139,9 +137,9 @@ class Secrets:
             self._found.add(text)
 
 
-def _models(annotation: Any) -> Iterator[type[BaseModel]]:
+def _models(annotation: Any) -> Iterator[type[TypedTable]]:
     """The models in a field's annotation."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+    if isinstance(annotation, type) and issubclass(annotation, TypedTable):
         yield annotation
     for inner in get_args(annotation):
         yield from _models(inner)

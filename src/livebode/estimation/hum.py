@@ -174,7 +174,7 @@ class SilentHum(StatefulBase):
 
 SECONDS_MIN = 2.0  # its thirds separate 50 from 60 Hz, with bins between them
 _PARTS = 3
-_MULTIPLES = np.unique(np.outer(MAINS_HZ, np.arange(1, HARMONICS + 1)))
+_MULTIPLES = np.array(sorted({base * k for base in MAINS_HZ for k in range(1, HARMONICS + 1)}))
 _REACH = 3e-3  # of its frequency by which the mains may be off
 _LOBE = 2  # bins on each side that a tone reaches in a Hann window
 _NOISE = 2.0  # standard deviation of a tone's power in a part: √(2·35/18), times √(noise per bin/power)

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import ConfigDict, Field, ValidationError, model_validator
-
-from livebode.core import ClockKind, DeferredModel, QuantityKind
+from livebode.core import ClockKind, Field, QuantityKind, TypedTable, errors_of
 from livebode.estimates import RESPONSE, kind_of
 
 Text = Annotated[str, Field(max_length=100_000)]
@@ -17,13 +15,11 @@ Epoch = Annotated[int, Field(ge=0, lt=1 << 64)]  # the frames have 64 bits for i
 Section = dict[str, Any]
 
 
-class _Part(DeferredModel):
-    model_config = ConfigDict(extra="allow", strict=True, allow_inf_nan=False)
+class _Part(TypedTable, extra="allow", strict=True, allow_inf_nan=False):
+    """A table whose further keys are not checked."""
 
 
-class _Kinds(DeferredModel):
-    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
-
+class _Kinds(TypedTable, extra="forbid", strict=True, allow_inf_nan=False):
     output: QuantityKind | None
     input: QuantityKind | None
     output_unit: Text = ""
@@ -77,14 +73,13 @@ class _MatrixFound(_Found):
     units: list[list[Text]]
     kinds_of_entries: list[list[_Kinds]]
 
-    @model_validator(mode="after")
-    def _has_all_entries(self) -> _MatrixFound:
+    def check(self) -> None:
+        """ValueError if the lists are not those of one matrix."""
         for name, rows in (("units", self.units), ("kinds_of_entries", self.kinds_of_entries)):
             if [len(row) for row in rows] != [len(self.inputs)] * len(self.outputs):
                 raise ValueError(f"{name} has not one element for each entry")
         if len({*self.outputs}) != len(self.outputs) or len({*self.inputs}) != len(self.inputs):
             raise ValueError("a signal is duplicated")
-        return self
 
 
 class _OutputOnlyFound(_Part):
@@ -198,8 +193,8 @@ def what_is_wrong(summary: dict[str, Any]) -> str:
     """
     try:
         _SHAPES.get(kind_of(summary), _AnySummary).model_validate(summary)
-    except ValidationError as error:
-        first = error.errors()[0]
+    except ValueError as error:
+        first = errors_of(error)[0]
         return f"{'.'.join(map(str, first['loc']))}: {first['msg']}"
     return ""
 

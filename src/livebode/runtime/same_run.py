@@ -6,8 +6,6 @@ from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
-
 from livebode.configuration import NOT_RECORDED, Axis, without_null
 from livebode.core import RecordError
 
@@ -85,6 +83,6 @@ def _configuration(summary: Mapping[str, Any]) -> tuple[dict[str, Any], bool]:
     given = {name: value for name, value in given.items() if name not in _CHANGEABLE}
     try:
         axis = Axis.model_validate(given)
-    except ValidationError:  # a demo, or another version has other keys
+    except ValueError:  # a demo, or another version has other keys
         return given, samples
     return axis.model_dump(mode="json", by_alias=True, exclude_defaults=True), samples

@@ -8,19 +8,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
-from pydantic import (
-    AfterValidator,
-    ConfigDict,
+from livebode.core import (
+    Channel,
+    ClockKind,
+    ConfigError,
+    Conversion,
     Field,
-    PlainSerializer,
-    PlainValidator,
-    SerializationInfo,
-    WithJsonSchema,
-    create_model,
+    QuantityKind,
+    TypedTable,
+    UsageError,
+    ValueCheck,
 )
-from pydantic_core import PydanticCustomError
-
-from livebode.core import Channel, ClockKind, ConfigError, DeferredModel, QuantityKind, UsageError
 from livebode.locations import Location, Url, location
 from livebode.plugins import loaded, named
 from livebode.sources.quantities import DeclaredQuantities
@@ -82,24 +80,12 @@ def part_limit(given: float | str) -> PartLimit:
 
 def _recording(given: Any) -> Location:
     if not isinstance(given, str | Path | Url):
-        raise PydanticCustomError("location", "input is not a valid path or URL")
+        raise ValueError("input is not a valid path or URL")
     return location(given) if isinstance(given, str) else given
 
 
-def _plain_recording(value: Any, info: SerializationInfo) -> Any:
-    if info.mode != "json":
-        return value
-    # Of the union below, the first serializer gets a list too.
-    return list(map(str, value)) if isinstance(value, list) else str(value)
-
-
 File = Annotated[Path, Field(strict=False)]
-LocatedFile = Annotated[
-    Any,
-    PlainValidator(_recording),
-    PlainSerializer(_plain_recording),
-    WithJsonSchema({"type": "string", "format": "path"}),
-]
+LocatedFile = Annotated[Any, Conversion(_recording, "path")]
 """A path or URL; as JSON without a secret in it."""
 LOG = {"log", "time", "rate_hz", "follow", "dbc"}
 EVERY = {"timeout_s", "kinds", "units"}
@@ -114,14 +100,14 @@ def _checked_limit(given: float | str) -> float | str:
     return given
 
 
-Limit = Annotated[float | Annotated[str, Field(json_schema_extra={"pattern": PATTERN})], AfterValidator(_checked_limit)]
+Limit = Annotated[float | Annotated[str, Field(json_schema_extra={"pattern": PATTERN})], ValueCheck(_checked_limit)]
 
 
 def _checked_units(units: dict[str, str]) -> dict[str, str]:
     return dict(DeclaredQuantities(units=units).units)
 
 
-class SourceKeys(DeferredModel):
+class SourceKeys(TypedTable, extra="forbid", strict=True, allow_inf_nan=False):
     """[source]: a recording (`log`), one that grows (`follow`), a live source (`url`), or a recorded one (`replay`).
 
     Parameters
@@ -174,8 +160,6 @@ class SourceKeys(DeferredModel):
         iq = "0.35 N m", speed = "rpm" }. Samples are converted to SI units when they are read.
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
-
     log: LocatedFile | Annotated[list[LocatedFile], Field(min_length=1, max_length=RECORDINGS_MAX)] | None = None
     time: str | None = None
     clock: ClockKind | None = None
@@ -193,7 +177,7 @@ class SourceKeys(DeferredModel):
     fields: dict[str, str] = {}
     sample_field: str | None = None
     kinds: dict[str, QuantityKind] = {}
-    units: Annotated[dict[str, str], AfterValidator(_checked_units)] = {}
+    units: Annotated[dict[str, str], ValueCheck(_checked_units)] = {}
 
     @property
     def live(self) -> bool:
@@ -236,9 +220,8 @@ def __getattr__(name: str) -> type[SourceKeys]:
     if name != "SourceSettings":
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     own = (loaded(kind.settings) for kind in named("sources").values() if kind.settings)
-    model: type[SourceKeys] = create_model(
-        name, __base__=(*dict.fromkeys(own), SourceKeys), __module__=__name__, __doc__=SourceKeys.__doc__
-    )
+    space = {"__module__": __name__, "__doc__": SourceKeys.__doc__}
+    model: type[SourceKeys] = type(name, (*dict.fromkeys(own), SourceKeys), space)
     globals()[name] = model
     return model
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import Field
-
+from livebode.core import Field
 from livebode.sources.live import SourceKeys
 
 File = Annotated[Path, Field(strict=False)]

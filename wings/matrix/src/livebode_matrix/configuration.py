@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from pydantic import BaseModel
-
 from livebode.configuration import Axis, ExperimentsSection, check_controllers, matrix_loop
-from livebode.core import ConfigError, Lines
+from livebode.core import ConfigError, Lines, TypedTable
 from livebode_matrix.settings import MatrixSettings
 
 _USED = {
@@ -38,7 +36,7 @@ def _check_keys(axis: Axis) -> None:
     unused += [name for name in _OTHER_RUNS if getattr(axis, name) is not None]
     for name in sorted(axis.model_fields_set - _USED_WHOLE):
         section = getattr(axis, name)
-        if isinstance(section, BaseModel):
+        if isinstance(section, TypedTable):
             used = _USED.get(name, set())
             kind = type(section)
             set_keys = [k for k in sorted(section.model_fields_set - used) if _differs(section, k)]
@@ -56,7 +54,7 @@ def _check_keys(axis: Axis) -> None:
         )
 
 
-def _differs(section: BaseModel, key: str) -> bool:
+def _differs(section: TypedTable, key: str) -> bool:
     """Whether the key has another value than its default."""
     return bool(getattr(section, key) != type(section).model_fields[key].get_default(call_default_factory=True))
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from livebode.core import UsageError
+from livebode.core import UsageError, errors_of
 
 if TYPE_CHECKING:
     from livebode.configuration import ReportSection
@@ -58,8 +58,6 @@ def header(recorded: ReportSection, template: Path | None, ask: bool, specified:
 
 def _checked(specified: dict[str, Any]) -> dict[str, Any]:
     """The values as a file could have them."""
-    from pydantic import ValidationError
-
     from livebode.configuration import ReportSection, report_error
 
     for text in specified.values():
@@ -72,8 +70,8 @@ def _checked(specified: dict[str, Any]) -> dict[str, Any]:
             )
     try:
         ReportSection.model_validate(specified)
-    except ValidationError as error:
-        raise report_error(error.errors(include_url=False)[0]) from None
+    except ValueError as error:
+        raise report_error(errors_of(error)[0]) from None
     return specified
 
 
