@@ -18,8 +18,8 @@ from livebode.pictures import (
     Dots,
     Entry,
     Figure,
-    Line,
     Scale,
+    Trace,
     number_text,
     room,
     save_svg,
@@ -69,7 +69,7 @@ def _panel(panel: Panel, left: float, top: float) -> pictures.Panel:
     )  # fmt: skip
     down = Scale(low / spread, high * spread, ticks, texts, (), True, panel.y_label)
     marks = (
-        Line("power", x, middle, LIGHT.muted, 1.0, "dashed"), Line("measured", x, y, LIGHT.run, 1.4),
+        Trace("power", x, middle, LIGHT.muted, 1.0, "dashed"), Trace("measured", x, y, LIGHT.run, 1.4),
         Dots("measured", x, y, LIGHT.run),
     )  # fmt: skip
     margin = room(down)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from livebode.core import MatrixResponses
-from livebode.pictures import Figure, Line, Note, Shade, matrix_figure, save_matrix_pictures, singular_values_figure
+from livebode.pictures import Figure, Note, Shade, Trace, matrix_figure, save_matrix_pictures, singular_values_figure
 from livebode_matrix import example_matrix_responses
 
 NEWEST = example_matrix_responses()[-1:]
@@ -42,14 +42,14 @@ def test_each_entry_is_drawn_in_decibels() -> None:
     magnitudes = [panel for panel in figure.panels if panel.title]
     assert [panel.title for panel in magnitudes] == [f"{i} → {o}" for o in NEWEST.outputs for i in NEWEST.inputs]
     for panel, (o, i) in zip(magnitudes, np.ndindex(2, 2)):
-        (found, *_) = (mark for mark in panel.marks if isinstance(mark, Line))
+        (found, *_) = (mark for mark in panel.marks if isinstance(mark, Trace))
         assert np.allclose(found.y, 20 * np.log10(np.abs(NEWEST.value[0, :, o, i])))
     assert not any(_shaded(figure))
 
 
 def test_singular_values_are_those_of_the_matrices() -> None:
     (panel,) = singular_values_figure(NEWEST).panels
-    drawn = [mark.y for mark in panel.marks if isinstance(mark, Line)]
+    drawn = [mark.y for mark in panel.marks if isinstance(mark, Trace)]
     expected = 20 * np.log10(np.linalg.svd(NEWEST.value[0], compute_uv=False))
     assert np.allclose(np.array(drawn).T, expected)
     assert [(end.text, end.value) for end in panel.ends] == [

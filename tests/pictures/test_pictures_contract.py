@@ -18,9 +18,9 @@ from livebode.pictures import (
     Band,
     Dots,
     Figure,
-    Line,
     Panel,
     Scale,
+    Trace,
     bode_figure,
     columns,
     matrix_figure,
@@ -122,7 +122,7 @@ def test_a_picture_of_many_responses_is_small_and_has_what_can_be_seen() -> None
     x, rng = np.arange(100_000.0), np.random.default_rng(0)
     y = np.cumsum(rng.normal(size=x.size))
     scales = Scale(0.0, x[-1]), Scale(float(y.min()), float(y.max()))
-    marks = (Line("value", x, y, "#0072b2"), Band("bound", x, y - 3, y + 3, "#0072b2"), Dots("dots", x, y, "#0072b2"))
+    marks = (Trace("value", x, y, "#0072b2"), Band("bound", x, y - 3, y + 3, "#0072b2"), Dots("dots", x, y, "#0072b2"))
     for mark in marks:
         panel = Panel(0.0, 0.0, 500.0, 300.0, *scales, [mark])
         text = svg_file(Figure("", (), (), [panel], 300.0))

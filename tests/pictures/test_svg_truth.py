@@ -13,6 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
+from livebode import example_responses
 from livebode.language import in_language
 from livebode.pictures import (
     DARK,
@@ -24,17 +25,16 @@ from livebode.pictures import (
     Dots,
     Entry,
     Figure,
-    Line,
     Panel,
     Scale,
     Shade,
+    Trace,
     bode_figure,
     svg,
     svg_file,
     tracking_figure,
     value_scale,
 )
-from tests.pictures.test_figures_truth import resonant
 from tests.support.drawn_svg import SVG, checked, paths_of
 
 WIDTH, HEIGHT = 400.0, 200.0
@@ -67,7 +67,7 @@ def curves(draw: st.DrawFn) -> tuple[np.ndarray, np.ndarray]:
 def test_a_line_has_its_points_and_is_open_where_nothing_is_known(curve: tuple[np.ndarray, np.ndarray]) -> None:
     x, y = curve
     known = np.isfinite(y)
-    parts = drawn(Line("mark", x, y, "#0072b2"))
+    parts = drawn(Trace("mark", x, y, "#0072b2"))
     lines = [part for part in parts if len(part) > 1 and np.ptp(part[:, 0] + part[:, 1])]
     every = np.array([point for part in parts for point in np.unique(part, axis=0)]).reshape(-1, 2)
     for point in at(x, y)[known]:
@@ -133,7 +133,7 @@ def test_cells_have_the_colour_of_their_value_and_grey_where_there_is_none(logar
 
 
 def test_every_colour_of_a_picture_has_a_dark_one_and_text_its_contrast() -> None:
-    figure = bode_figure(resonant(), title="t")
+    figure = bode_figure(example_responses(), title="t")
     text = svg_file(figure)
     used = set(re.findall(r'(?:fill|stroke)="(#[0-9a-f]{6})"', text.partition("</style>")[2]))
     dark = dict(re.findall(r'\.figure \[fill="(#[0-9a-f]{6})"\]\{fill:(#[0-9a-f]{6})\}', text))
@@ -154,7 +154,7 @@ def contrast(one: str, other: str) -> float:
 
 
 def test_texts_are_in_the_language_in_use() -> None:
-    run = replace(resonant(), unit="")
+    run = replace(example_responses(), unit="")
     with in_language("de"):
         figures = bode_figure(run), tracking_figure(run)
         words = {text.text for figure in figures for text in checked(svg_file(figure)).iter(f"{SVG}text")}

@@ -255,7 +255,7 @@ def test_a_broken_summary_ends_in_a_sentence(tmp_path: Path, runs: dict[str, Pat
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", DamageWarning)
             for one in asked:
-                done = livebode(*one, pictures=one[0] == "margins")
+                done = livebode(*one)
                 assert "Traceback" not in done.err, (one[0], data[:4000])
                 assert done.code in (0, 2, 3)
 

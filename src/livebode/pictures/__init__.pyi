@@ -26,13 +26,13 @@ from livebode.pictures.figure import Dots as Dots
 from livebode.pictures.figure import End as End
 from livebode.pictures.figure import Entry as Entry
 from livebode.pictures.figure import Figure as Figure
-from livebode.pictures.figure import Line as Line
 from livebode.pictures.figure import Mark as Mark
 from livebode.pictures.figure import Note as Note
 from livebode.pictures.figure import Panel as Panel
 from livebode.pictures.figure import Scale as Scale
 from livebode.pictures.figure import Shade as Shade
 from livebode.pictures.figure import Tag as Tag
+from livebode.pictures.figure import Trace as Trace
 from livebode.pictures.figure import alone as alone
 from livebode.pictures.figure import empty_scale as empty_scale
 from livebode.pictures.figure import end_room as end_room

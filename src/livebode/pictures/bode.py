@@ -17,10 +17,10 @@ from livebode.pictures.figure import (
     Dots,
     Entry,
     Figure,
-    Line,
     Mark,
     Note,
     Scale,
+    Trace,
     empty_scale,
     frequency_scale,
     limits_around,
@@ -71,7 +71,7 @@ def bode_figure(
     marks = [_marks(summary, of, *values) for of, values in zip(run, newest)]
     if curve is not None:
         for panel, values in zip(marks, curve[1:]):
-            panel.append(Line("fit", curve[0], values, LIGHT.ink, 1.0, "dashed"))
+            panel.append(Trace("fit", curve[0], values, LIGHT.ink, 1.0, "dashed"))
     magnitude_label = words.magnitude_label(responses, 54)
     db = limits_around(_values(run[0], newest[0][0]), np.concatenate([*newest[0][1:], fit_db]), 3.0)
     around_deg = np.concatenate([*newest[1][1:], fit_deg])
@@ -129,14 +129,14 @@ def _marks(summary: Summary, run: Floats | None, value: Floats, low: Floats, hig
     marks: list[Mark] = []
     if summary.count > 1 and run is not None:
         marks.append(Band("span", f, run[0], run[2], LIGHT.run, 0.2))
-        marks.append(Line("median", f, run[1], LIGHT.run, 1.5))
+        marks.append(Trace("median", f, run[1], LIGHT.run, 1.5))
         if few:
             marks.append(Dots("median", f, run[1], LIGHT.run))
     if few:
         if run is None:
-            marks.append(Line("mean", f, value, LIGHT.newest, 0.8))
+            marks.append(Trace("mean", f, value, LIGHT.newest, 0.8))
         return [*marks, Bars("bound", f, low, high, LIGHT.newest), Dots("newest", f, value, LIGHT.newest, 4.5, "dash")]
-    return [*marks, Band("bound", f, low, high, LIGHT.newest, 0.28), Line("newest", f, value, LIGHT.newest, 0.9)]
+    return [*marks, Band("bound", f, low, high, LIGHT.newest, 0.28), Trace("newest", f, value, LIGHT.newest, 0.9)]
 
 
 def _key(summary: Summary, fit: bool, mean: bool) -> list[Entry]:

@@ -46,7 +46,7 @@ class Scale:
 
 
 @dataclass(frozen=True, eq=False)
-class Line:
+class Trace:
     """Neighbouring points are connected; a known one without a known neighbour is a dot."""
 
     name: str
@@ -152,7 +152,7 @@ class Tag:
     anchor: Literal["start", "middle", "end"] = "middle"
 
 
-Mark = Line | Band | Bars | Dots | Areas | Shade | Cells | Note | Tag
+Mark = Trace | Band | Bars | Dots | Areas | Shade | Cells | Note | Tag
 
 
 @dataclass(frozen=True, eq=False)

@@ -26,12 +26,12 @@ from livebode.pictures.figure import (
     End,
     Entry,
     Figure,
-    Line,
     Mark,
     Note,
     Panel,
     Scale,
     Shade,
+    Trace,
     empty_scale,
     frequency_scale,
     limits_around,
@@ -133,7 +133,7 @@ class _Entry:
 
 def _curve(f: Floats, value: Floats, low: Floats, high: Floats, colour: str, dashes: str = "") -> list[Mark]:
     """A curve with its bound, with a marker at few lines."""
-    line = Line("value", f, value, colour, 1.2, dashes)
+    line = Trace("value", f, value, colour, 1.2, dashes)
     if len(f) > FEW_LINES:
         return [Band("bound", f, low, high, colour, 0.28), line]
     return [Bars("bound", f, low, high, colour), line, Dots("value", f, value, colour, 3.6)]

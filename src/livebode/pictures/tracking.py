@@ -20,11 +20,11 @@ from livebode.pictures.figure import (
     End,
     Entry,
     Figure,
-    Line,
     Mark,
     Note,
     Panel,
     Scale,
+    Trace,
     empty_scale,
     end_room,
     limits_around,
@@ -127,7 +127,7 @@ def _over_time(responses: Responses, level: Floats, bounds: Floats) -> tuple[Sca
     marks: list[Mark] = []
     for i, colour in zip(range(level.shape[1]), LIGHT.traces):
         marks.append(Band("bound", time_s, low[:, i], high[:, i], colour, 0.18))
-        marks.append(Line("magnitude", time_s, level[:, i], colour))
+        marks.append(Trace("magnitude", time_s, level[:, i], colour))
     return value_scale(*_wider(time_s, 0.01), label) if time_s.size else empty_scale(label), marks
 
 

@@ -248,7 +248,7 @@ class _Inside:
     def drawn(self, mark: Mark) -> str:
         """The mark as elements."""
         match mark:
-            case described.Line():
+            case described.Trace():
                 return self._line(mark)
             case described.Band():
                 return self._band(mark)
@@ -274,7 +274,7 @@ class _Inside:
         with np.errstate(invalid="ignore"):
             return np.rint(np.clip(values, -_FAR * size, (1 + _FAR) * size))
 
-    def _line(self, mark: described.Line) -> str:
+    def _line(self, mark: described.Trace) -> str:
         x, y = self._x(mark.x), self._y(mark.y)
         points = x + y  # NaN where either is
         path = "".join(_path(*_joined(x[run], y[run])) for run in _runs(points) if run.stop - run.start > 1)

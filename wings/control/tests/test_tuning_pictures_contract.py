@@ -10,7 +10,7 @@ import pytest
 from livebode.core import PID, Lines, Loop, Responses
 from livebode.fitting import EvaluationGrid, TwoMass
 from livebode.motion import FrictionCurve
-from livebode.pictures import Line, svg_file
+from livebode.pictures import Trace, svg_file
 from livebode_control.proposal.tuning_picture import tuning_figure
 from livebode_control.tuning import ControllerProposal, LoopSpecification, tune
 from livebode_control.tuning.feedforward import Feedforward
@@ -58,7 +58,7 @@ def test_below_is_what_was_asked_for(found: ControllerProposal, gains: GainSched
     figure = tuning_figure(found, gains=gains, feedforward=forward)
     checked(svg_file(figure))
     noise, scheduled, bandwidths, friction = (
-        {mark.name: mark for mark in panel.marks if isinstance(mark, Line)} for panel in figure.panels[-4:]
+        {mark.name: mark for mark in panel.marks if isinstance(mark, Trace)} for panel in figure.panels[-4:]
     )
     assert (noise["before"].y[-1], noise["proposed"].y[-1]) == pytest.approx(found.noise)
     assert noise["limit"].y[0] == SPECIFICATION.input_noise

@@ -20,10 +20,10 @@ from livebode.pictures import (
     Dots,
     Entry,
     Figure,
-    Line,
     Mark,
     Panel,
     Scale,
+    Trace,
     frequency_scale,
     phase_scale,
     room,
@@ -90,12 +90,12 @@ def _facts(design: Design) -> list[str]:
     ]  # fmt: skip
 
 
-def _period(waveform: Waveform) -> Line | Band:
+def _period(waveform: Waveform) -> Trace | Band:
     samples, rate_hz = waveform.samples, waveform.lines.rate_hz
     ms = 1000 * np.arange(samples.size + 1) / rate_hz
     if samples.size < _POINTS_MAX:
         # A drive outputs each sample until the next.
-        return Line("excitation", np.repeat(ms, 2)[1:-1], np.repeat(samples, 2), LIGHT.run, 1.2)
+        return Trace("excitation", np.repeat(ms, 2)[1:-1], np.repeat(samples, 2), LIGHT.run, 1.2)
     each = -(-samples.size // (_POINTS_MAX // 2))
     parts = np.array_split(samples, -(-samples.size // each))
     times = ms[np.cumsum([0, *(part.size for part in parts[:-1])])]
@@ -103,7 +103,7 @@ def _period(waveform: Waveform) -> Line | Band:
     return Band("excitation", times, low, high, LIGHT.run, 1.0)
 
 
-def _shares(waveform: Waveform, y: Scale, levels: list[Line]) -> Panel:
+def _shares(waveform: Waveform, y: Scale, levels: list[Trace]) -> Panel:
     """The histogram of the samples, beside them."""
     counts, edges = np.histogram(waveform.samples, bins=_CLASSES)
     percent = 100 * counts / waveform.samples.size
@@ -116,22 +116,22 @@ def _shares(waveform: Waveform, y: Scale, levels: list[Line]) -> Panel:
     return Panel(588.0 - _SHARES, ABOVE, _SHARES, _HEIGHT, x, unlabelled(y), marks)
 
 
-def _levels(design: Design) -> list[Line]:
+def _levels(design: Design) -> list[Trace]:
     """The predicted extremes of the torque and its limits, as lines of one point."""
     torque = [peak for peak in design.peaks if peak.quantity == "torque"]
     _, limit = design.limits.of("torque")
     levels = [
-        Line("predicted", np.zeros(1), np.array([value]), LIGHT.newest, 1.2, "dashed")
+        Trace("predicted", np.zeros(1), np.array([value]), LIGHT.newest, 1.2, "dashed")
         for value in (min(peak.low for peak in torque), max(peak.high for peak in torque))
     ]
     if np.isfinite(limit):
         limits = (-limit, limit)
-        levels += [Line("limit", np.zeros(1), np.array([v]), LIGHT.ink, 1.2, "dotted") for v in limits]
+        levels += [Trace("limit", np.zeros(1), np.array([v]), LIGHT.ink, 1.2, "dotted") for v in limits]
     return levels
 
 
-def _across(level: Line, end: float) -> Line:
-    return Line(level.name, np.array([0.0, end]), np.repeat(level.y, 2), level.colour, level.width, level.dashes)
+def _across(level: Trace, end: float) -> Trace:
+    return Trace(level.name, np.array([0.0, end]), np.repeat(level.y, 2), level.colour, level.width, level.dashes)
 
 
 def _odd_without(waveform: Waveform) -> Floats:
@@ -148,7 +148,7 @@ def _lines(waveform: Waveform, odd: Floats, top: float) -> tuple[list[Panel], fl
     f, spectrum = lines.frequency_hz, waveform.spectrum[list(lines.bins)]
     few, size = len(f) <= FEW_LINES, np.abs(spectrum)
     sizes: list[Mark] = [Bars("line", f, np.zeros(len(f)), size, LIGHT.run)] if few else []
-    sizes.append(Dots("line", f, size, LIGHT.run) if few else Line("line", f, size, LIGHT.run, 1.0))
+    sizes.append(Dots("line", f, size, LIGHT.run) if few else Trace("line", f, size, LIGHT.run, 1.0))
     sizes.append(Dots("odd", odd, np.zeros(odd.size), LIGHT.newest, 5.0, "ring"))
     turned = np.degrees(np.angle(spectrum * 1j))  # of sines, as in eq. (6)
     phases: list[Mark] = [Dots("phase", f, turned, LIGHT.run, 4.0 if few else 2.0)]

@@ -16,11 +16,11 @@ from livebode.pictures import (
     Band,
     End,
     Figure,
-    Line,
     Mark,
     Note,
     Panel,
     Scale,
+    Trace,
     clock,
     empty_scale,
     end_room,
@@ -85,7 +85,7 @@ def _curve(time_s: Floats, value: Floats, sigma: Floats, colour: str, dashes: st
     times, (middle, low, high) = with_holes(time_s, [x[:, np.newaxis] for x in (value, value - bound, value + bound)])
     return [
         Band("bound", times, low[:, 0], high[:, 0], colour),
-        Line("value", times, middle[:, 0], colour, 1.3, dashes),
+        Trace("value", times, middle[:, 0], colour, 1.3, dashes),
     ]
 
 

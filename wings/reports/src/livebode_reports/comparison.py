@@ -21,9 +21,9 @@ from livebode.pictures import (
     Dots,
     Entry,
     Figure,
-    Line,
     Mark,
     Panel,
+    Trace,
     bound_db,
     bound_deg,
     colour_bar,
@@ -100,9 +100,9 @@ def _response(f: Floats, response: Response, turn: Floats, colour: str, name: st
 
 def _curve(f: Floats, middle: Floats, low: Floats, high: Floats, colour: str, name: str) -> list[Mark]:
     if len(f) > FEW_LINES:
-        return [Band(f"{name}-bound", f, low, high, colour, 0.25), Line(name, f, middle, colour, 1.1)]
+        return [Band(f"{name}-bound", f, low, high, colour, 0.25), Trace(name, f, middle, colour, 1.1)]
     bars = Bars(f"{name}-bound", f, low, high, colour)
-    return [bars, Line(name, f, middle, colour, 0.8), Dots(name, f, middle, colour, 4.0, "dash")]
+    return [bars, Trace(name, f, middle, colour, 0.8), Dots(name, f, middle, colour, 4.0, "dash")]
 
 
 def _ratio(f: Floats, ratio: Complex, bound: Floats, differs: NDArray[np.bool_]) -> tuple[_Drawn, _Drawn]:
@@ -112,7 +112,7 @@ def _ratio(f: Floats, ratio: Complex, bound: Floats, differs: NDArray[np.bool_])
     for middle, under, over in ((decibels(ratio), low, high), (deg, deg - half, deg + half)):
         known = np.isfinite(middle)
         marks: list[Mark] = [
-            Line("zero", f[[0, -1]], np.zeros(2), LIGHT.muted, 0.9),
+            Trace("zero", f[[0, -1]], np.zeros(2), LIGHT.muted, 0.9),
             Bars("ratio-bound", f[known], under[known], over[known], LIGHT.ink, 1.2, 0.7),
             Dots("differs", f[differs], middle[differs], LIGHT.ink, 5.0),
             Dots("same", f[~differs], middle[~differs], LIGHT.ink, 5.0, "ring"),

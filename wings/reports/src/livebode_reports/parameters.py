@@ -14,9 +14,9 @@ from livebode.pictures import (
     WIDTH,
     Band,
     Figure,
-    Line,
     Mark,
     Panel,
+    Trace,
     clock,
     labelled,
     room,
@@ -56,7 +56,7 @@ def parameters_figure(time_s: Floats, curves: Sequence[Curve]) -> Figure:
         )
         marks: list[Mark] = [
             Band("bound", times, low[:, 0], high[:, 0], LIGHT.run),
-            Line("value", times, middle[:, 0], LIGHT.run, 1.2),
+            Trace("value", times, middle[:, 0], LIGHT.run, 1.2),
         ]
         across, down = i % _COLUMNS, i // _COLUMNS
         last = i + _COLUMNS >= len(curves)

@@ -23,10 +23,10 @@ from livebode.pictures import (
     Dots,
     Entry,
     Figure,
-    Line,
     Mark,
     Panel,
     Tag,
+    Trace,
     phase_scale,
     room,
     round_frequency_scale,
@@ -119,10 +119,10 @@ def _bode(
     levels = ((0.0,), tuple(-180.0 + 360 * k for k in turns))
     panels: list[list[Mark]] = []
     for i, values in enumerate(middle):
-        marks: list[Mark] = [Line("level", limits_hz, np.full(2, at), LIGHT.muted, 0.9) for at in levels[i]]
+        marks: list[Mark] = [Trace("level", limits_hz, np.full(2, at), LIGHT.muted, 0.9) for at in levels[i]]
         marks.append(Band("bound", f, ends[0][i], ends[1][i], LIGHT.run))
-        marks.append(Line("model", f, values, LIGHT.run, 1.0, "dashed"))
-        marks.append(Line("fit", f, np.where(inside, values, np.nan), LIGHT.run, 1.6))
+        marks.append(Trace("model", f, values, LIGHT.run, 1.0, "dashed"))
+        marks.append(Trace("fit", f, np.where(inside, values, np.nan), LIGHT.run, 1.6))
         panels.append(marks)
     measured_hz, measured, bound = _measured(loop_curves)
     size = np.abs(measured)
@@ -149,9 +149,9 @@ def nyquist_panel(marks: list[Mark], *, left: float, top: float) -> Panel:
     """The plane of L around −1, with the same scale in both directions, the unit circle and −1."""
     ring = _CORNERS
     axes: list[Mark] = [
-        Line("level", np.array([-_REACH, _REACH]), np.zeros(2), LIGHT.muted, 0.8),
-        Line("level", np.zeros(2), np.array([-_REACH, _REACH]), LIGHT.muted, 0.8),
-        Line("unit-circle", ring.real, ring.imag, LIGHT.muted, 0.9, "dotted"),
+        Trace("level", np.array([-_REACH, _REACH]), np.zeros(2), LIGHT.muted, 0.8),
+        Trace("level", np.zeros(2), np.array([-_REACH, _REACH]), LIGHT.muted, 0.8),
+        Trace("unit-circle", ring.real, ring.imag, LIGHT.muted, 0.9, "dotted"),
     ]
     critical = Dots("critical", np.array([-1.0]), np.zeros(1), LIGHT.ink, 12.0, "plus")
     width = 588.0 - left
@@ -165,7 +165,7 @@ def sensitivity_circle(max_sensitivity: float) -> list[Mark]:
     """The circle around −1 that L touches at its largest sensitivity, with its value."""
     ring = -1 + _CORNERS / max_sensitivity
     name = Tag(f"Ms = {number(max_sensitivity, '.3g')}", -1.0, 1 / max_sensitivity, LIGHT.ink)
-    return [Line("sensitivity", ring.real, ring.imag, LIGHT.ink, 1.2), name]
+    return [Trace("sensitivity", ring.real, ring.imag, LIGHT.ink, 1.2), name]
 
 
 def discs(value: Complex, radius: Floats, alpha: float) -> Areas:
@@ -179,8 +179,8 @@ def _nyquist(curves: LoopCurves, f: Floats, value: Complex) -> list[Mark]:
     inside = (f >= curves.fit.band_hz[0]) & (f <= curves.fit.band_hz[1])
     _, measured, bound = _measured(curves)
     marks: list[Mark] = [
-        Line("model", value.real, value.imag, LIGHT.run, 1.0, "dashed"),
-        Line("fit", np.where(inside, value.real, np.nan), value.imag, LIGHT.run, 1.6),
+        Trace("model", value.real, value.imag, LIGHT.run, 1.0, "dashed"),
+        Trace("fit", np.where(inside, value.real, np.nan), value.imag, LIGHT.run, 1.6),
         discs(measured, bound, 0.3),
         Dots("measured", measured.real, measured.imag, LIGHT.newest, 4.0),
     ]

@@ -23,11 +23,11 @@ from livebode.pictures import (
     Dots,
     Entry,
     Figure,
-    Line,
     Mark,
     Panel,
     Scale,
     Tag,
+    Trace,
     phase_scale,
     room,
     round_frequency_scale,
@@ -106,9 +106,9 @@ def _curves(proposal: ControllerProposal) -> list[tuple[Model, bool]]:
     return [(before, False), (proposal.feedback.model, True)]
 
 
-def _line(x: Floats, y: Floats, proposed: bool) -> Line:
+def _line(x: Floats, y: Floats, proposed: bool) -> Trace:
     name = "proposed" if proposed else "before"
-    return Line(name, x, y, LIGHT.run if proposed else LIGHT.muted, 1.5, "" if proposed else "dashed")
+    return Trace(name, x, y, LIGHT.run if proposed else LIGHT.muted, 1.5, "" if proposed else "dashed")
 
 
 def _bode(proposal: ControllerProposal) -> tuple[list[Panel], float]:
@@ -143,8 +143,8 @@ def _bode(proposal: ControllerProposal) -> tuple[list[Panel], float]:
     return stacked(round_frequency_scale(f[0], f[-1]), parts, left=left, width=588.0 - left)
 
 
-def _level(x: Floats, value: float) -> Line:
-    return Line("level", x[[0, -1]], np.full(2, value), LIGHT.muted, 0.9)
+def _level(x: Floats, value: float) -> Trace:
+    return Trace("level", x[[0, -1]], np.full(2, value), LIGHT.muted, 0.9)
 
 
 def _nyquist(proposal: ControllerProposal) -> list[Mark]:
@@ -173,7 +173,7 @@ def _nichols(proposal: ControllerProposal) -> list[Mark]:
     turn = np.exp(1j * np.linspace(0, 2 * np.pi, 181))
     marks: list[Mark] = [
         _level(np.array([-270.0, 90.0]), 0.0),
-        Line("level", np.full(2, -180.0), np.array([-30.0, 30.0]), LIGHT.muted, 0.9),
+        Trace("level", np.full(2, -180.0), np.array([-30.0, 30.0]), LIGHT.muted, 0.9),
     ]
     for feedback, proposed in _curves(proposal):
         behind = np.abs(feedback.response(plant.frequency_hz))
@@ -187,7 +187,7 @@ def _nichols(proposal: ControllerProposal) -> list[Mark]:
                 marks.append(Areas("disc", list(edges), LIGHT.newest, 0.18))
             marks.append(_line(deg, db, proposed))
     around = 1 - turn / proposal.specification.max_sensitivity  # −L
-    marks.append(Line("sensitivity", np.degrees(np.angle(around)) - 180, _db(around), LIGHT.ink, 1.2))
+    marks.append(Trace("sensitivity", np.degrees(np.angle(around)) - 180, _db(around), LIGHT.ink, 1.2))
     return [*marks, Dots("critical", np.array([-180.0]), np.zeros(1), LIGHT.ink, 12.0, "plus")]
 
 
@@ -246,7 +246,7 @@ def _noise(proposal: ControllerProposal) -> Drawn:
     marks: list[Mark] = [_line(f, value, proposed) for value, (_, proposed) in zip(values, curves)]
     if (limit := proposal.specification.noise_limit) is not None:
         values.append(np.array([limit]))
-        marks.append(Line("limit", f[[0, -1]], np.full(2, limit), LIGHT.ink, 1.2, "dotted"))
+        marks.append(Trace("limit", f[[0, -1]], np.full(2, limit), LIGHT.ink, 1.2, "dotted"))
     encoder = proposal.specification.encoder_step is not None
     title = tr("input noise by the encoder's rounding") if encoder else tr("input noise for white noise of 1")
     y = scale_around(values, tr("rms up to this frequency"), 5, 0.0)
@@ -260,7 +260,7 @@ def _gains(gains: GainSchedule) -> Drawn:
     ends: Mapping[int, Literal["start", "middle", "end"]] = {0: "start", -1: "end"}
     for i, (name, column) in enumerate(zip(gains.names, (gains.logarithms - gains.common_logarithms).T)):
         colour, value = LIGHT.traces[i % len(LIGHT.traces)], np.exp(column)
-        marks += [Line(name, gains.position, value, colour, 1.5), Dots(name, gains.position, value, colour, 4.0)]
+        marks += [Trace(name, gains.position, value, colour, 1.5), Dots(name, gains.position, value, colour, 4.0)]
         place = i % len(value)  # names beside each other overlap less than those at one end
         anchor = ends.get(place, ends.get(place - len(value), "middle"))
         marks.append(Tag(name.replace("_", " "), float(gains.position[place]), float(value[place]), colour, anchor))
@@ -294,7 +294,10 @@ def _friction(forward: Feedforward) -> Drawn:
     for sign in (-1, 1):
         v = sign * np.linspace(0, curve.speed[1], _POINTS)
         value, bound = forward.friction(v, sign)
-        marks += [Band("bound", v, value - bound, value + bound, LIGHT.run), Line("friction", v, value, LIGHT.run, 1.5)]
+        marks += [
+            Band("bound", v, value - bound, value + bound, LIGHT.run),
+            Trace("friction", v, value, LIGHT.run, 1.5),
+        ]
     words = {"inertia": number(forward.inertia, ".4g"), "bound": number(forward.inertia_bound, ".2g")}
     title = tr("feedforward: inertia {inertia} ± {bound}, friction", **words)
     y = scale_around([dots.y], labelled(tr("friction"), curve.units[curve.index("coulomb")]))

@@ -17,9 +17,9 @@ from livebode.pictures import (
     Dots,
     Entry,
     Figure,
-    Line,
     Mark,
     Panel,
+    Trace,
     room,
     save_svg,
     scale_around,
@@ -62,8 +62,8 @@ def friction_figure(curves: FrictionCurves, *, title: str = "") -> Figure:
         v = sign * np.linspace(max(curve.speed[0], 1e-3 * curve.speed[1]), curve.speed[1], _POINTS)
         value, bound = curve.at(v)
         marks.append(Band("bound", v, value - bound, value + bound, LIGHT.run, 0.25))
-        marks.append(Line("both", v, value, LIGHT.run, 1.8))
-        marks.append(Line("each", v, _with_offset(each, curve, v), LIGHT.newest, 1.2, "dashed"))
+        marks.append(Trace("both", v, value, LIGHT.run, 1.8))
+        marks.append(Trace("each", v, _with_offset(each, curve, v), LIGHT.newest, 1.2, "dashed"))
         drawn += [value - bound, value + bound]
     unit = curve.units[curve.index("coulomb")]
     reach = 1.04 * max(float(np.abs(dots.x).max(initial=0.0)), curve.speed[1])
@@ -73,8 +73,8 @@ def friction_figure(curves: FrictionCurves, *, title: str = "") -> Figure:
     )
     left, height = room(y), 260.0
     zero: list[Mark] = [
-        Line("zero", np.array([-reach, reach]), np.zeros(2), LIGHT.muted, 0.8),
-        Line("zero", np.zeros(2), np.array([y.low, y.high]), LIGHT.muted, 0.8),
+        Trace("zero", np.array([-reach, reach]), np.zeros(2), LIGHT.muted, 0.8),
+        Trace("zero", np.zeros(2), np.array([y.low, y.high]), LIGHT.muted, 0.8),
     ]
     panels = [Panel(left, ABOVE, 588.0 - left, height, x, y, [*zero, *marks])]
     top = ABOVE + height + BELOW
@@ -101,7 +101,7 @@ def _places(curve: FrictionCurve, label: str, top: float) -> Panel:
     x = scale_around([curve.places], "position")
     left = room(y)
     marks = (
-        Line("coulomb", curve.places, value, LIGHT.run, 1.4),
+        Trace("coulomb", curve.places, value, LIGHT.run, 1.4),
         Bars("bound", curve.places, value - bound, value + bound, LIGHT.run),
         Dots("coulomb", curve.places, value, LIGHT.run),
     )

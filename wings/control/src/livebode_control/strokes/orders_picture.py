@@ -16,8 +16,8 @@ from livebode.pictures import (
     Dots,
     Entry,
     Figure,
-    Line,
     Panel,
+    Trace,
     phase_scale,
     room,
     save_svg,
@@ -78,4 +78,6 @@ def _torque(shaft: ShaftOrders, unit: str, top: float) -> Panel:
     y = scale_around([torque], f"torque{unit}")
     x = phase_scale(0.0, 360.0, f"angle of the {shaft.shaft.name}, °")
     left = room(y)
-    return Panel(left, top, 588.0 - left, _HEIGHT, x, y, [Line("torque", np.degrees(angle), torque, LIGHT.newest, 1.2)])
+    return Panel(
+        left, top, 588.0 - left, _HEIGHT, x, y, [Trace("torque", np.degrees(angle), torque, LIGHT.newest, 1.2)]
+    )

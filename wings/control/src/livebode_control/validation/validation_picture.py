@@ -21,9 +21,9 @@ from livebode.pictures import (
     Dots,
     Entry,
     Figure,
-    Line,
     Mark,
     Panel,
+    Trace,
     room,
     save_svg,
     scale_around,
@@ -82,7 +82,7 @@ def _output(validation: Validation, top: float) -> Panel:
     )  # fmt: skip
     y = scale_around([measured, simulated], validation.output, 4)
     marks = (
-        Line("measured", at_s, measured, LIGHT.newest, 2.6), Line("simulated", at_s, simulated, LIGHT.run, 0.9),
+        Trace("measured", at_s, measured, LIGHT.newest, 2.6), Trace("simulated", at_s, simulated, LIGHT.run, 0.9),
     )  # fmt: skip
     left = room(y)
     x = value_scale(float(at_s[0]), float(at_s[-1]), tr("time in s"))
@@ -101,7 +101,7 @@ def _correlation(c: Correlation, counts: bool, top: float, last: bool) -> Panel:
     lags, zero = np.asarray(c.lags, dtype=float), np.zeros(len(c.lags))
     ends = lags[[0, -1]]
     marks: list[Mark] = [Band("limit", lags, zero - c.limit, zero + c.limit, LIGHT.run, 0.2)]
-    marks += [Line("white", ends, np.full(2, sign * c.white_limit), LIGHT.muted, 0.9, "dashed") for sign in (-1, 1)]
+    marks += [Trace("white", ends, np.full(2, sign * c.white_limit), LIGHT.muted, 0.9, "dashed") for sign in (-1, 1)]
     for of, colour, thick in ((c.judged, LIGHT.run, 1.6), (~c.judged, LIGHT.muted, 0.6)):
         marks.append(Bars("correlation", lags[of], zero[of], c.value[of], colour, thick))
     marks.append(Dots("outside", lags[outside], c.value[outside], LIGHT.newest, 4.0))

@@ -16,11 +16,11 @@ from livebode.pictures import (
     End,
     Entry,
     Figure,
-    Line,
     Mark,
     Panel,
     Scale,
     Shade,
+    Trace,
     end_room,
     frequency_scale,
     room,
@@ -74,9 +74,9 @@ def _input(design: MatrixDesign, i: int, scale: Scale) -> list[Mark]:
     begins = period_s * used.dwell * np.arange(len(used.spectra), dtype=np.float64)
     marks: list[Mark] = [Shade("transient", begins, begins + used.settle * period_s, LIGHT.nothing, 0.45)]
     ends = np.array([scale.low, scale.high])
-    marks += [Line("experiment", np.full(2, begin), ends, LIGHT.ink, 1.0) for begin in begins[1:]]
+    marks += [Trace("experiment", np.full(2, begin), ends, LIGHT.ink, 1.0) for begin in begins[1:]]
     seconds = np.arange(used.samples.shape[1]) / used.lines.rate_hz
-    marks.append(Line("excitation", seconds, used.samples[i], LIGHT.traces[i % len(LIGHT.traces)], 0.9))
+    marks.append(Trace("excitation", seconds, used.samples[i], LIGHT.traces[i % len(LIGHT.traces)], 0.9))
     return marks
 
 
@@ -87,13 +87,13 @@ def _bounds(design: MatrixDesign, top: float) -> Panel:
     for o, output in enumerate(design.outputs):
         for i, input in enumerate(design.inputs):
             percent, colour = 100 * design.bound[:, o, i], LIGHT.traces[o % len(LIGHT.traces)]
-            marks.append(Line(f"{o}-{i}", f, percent, colour, 1.2, _DASHES[i % len(_DASHES)]))
+            marks.append(Trace(f"{o}-{i}", f, percent, colour, 1.2, _DASHES[i % len(_DASHES)]))
             marks.append(Dots(f"{o}-{i}", f, percent, colour, 3.6))
             ends.append(End(f"{output}/{input}", float(percent[-1]), colour))
     if design.spec.accuracy is not None:
         required = np.full(2, 100 * design.spec.accuracy)
-        marks.append(Line("required", f[[0, -1]], required, LIGHT.ink, 1.2, "dotted"))
-    drawn = [mark.y for mark in marks if isinstance(mark, Line)]
+        marks.append(Trace("required", f[[0, -1]], required, LIGHT.ink, 1.2, "dotted"))
+    drawn = [mark.y for mark in marks if isinstance(mark, Trace)]
     y = scale_around(drawn, "95 % bound in % of the largest response", 5, 0.0)
     left, right = room(y), 588.0 - end_room(ends)
     return Panel(left, top, right - left, _BOUNDS, frequency_scale(f), y, marks, ends)

@@ -24,12 +24,12 @@ from livebode.pictures import (
     Dots,
     Entry,
     Figure,
-    Line,
     Mark,
     Panel,
     Scale,
     Shade,
     Tag,
+    Trace,
     labelled,
     room,
     scale_around,
@@ -132,9 +132,9 @@ def _marks(year: Year, y: Scale) -> list[Mark]:
         part = slice(first, stop)
         times, line, half = year.time_s[part], year.line[part], year.line_bound[part]
         marks.append(Band("band", times, line - half, line + half, LIGHT.newest, 0.25))
-        marks.append(Line("trend", times, line, LIGHT.newest, 1.7))
+        marks.append(Trace("trend", times, line, LIGHT.newest, 1.7))
     ends = np.array([y.low, y.high])
-    return marks + [Line("change", np.full(2, time_s), ends, LIGHT.ink, 0.9, "dashed") for time_s, _ in year.changes]
+    return marks + [Trace("change", np.full(2, time_s), ends, LIGHT.ink, 0.9, "dashed") for time_s, _ in year.changes]
 
 
 def _limits(year: Year) -> tuple[float, float]:
