@@ -42,16 +42,16 @@ def machine(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def run(machine: Path, name: str, fit: str, *options: str, pictures: bool = False) -> tuple[Path, str]:
+def run(machine: Path, name: str, fit: str, *options: str) -> tuple[Path, str]:
     (machine / f"{name}.toml").write_text(KEYS + fit, encoding="utf-8")
-    result = livebode("run", machine / f"{name}.toml", "--out", machine / name, *options, pictures=pictures)
+    result = livebode("run", machine / f"{name}.toml", "--out", machine / name, *options)
     assert (result.code, result.err) == (0, "")
     return machine / name, result.out
 
 
 def test_a_run_with_fits_leaves_parameters_numbers_and_a_curve(machine: Path) -> None:
-    plain, _ = run(machine, "plain", "", pictures=True)
-    out, printed = run(machine, "fitted", '[fit]\nmodel = "two-mass"\nradius_m = 0.019\n', pictures=True)
+    plain, _ = run(machine, "plain", "")
+    out, printed = run(machine, "fitted", '[fit]\nmodel = "two-mass"\nradius_m = 0.019\n')
     table = pq.read_table(out / "parameters.parquet")
     columns = table.to_pydict()
     rows = np.array([n == "Keff" and s == "ok" for n, s in zip(columns["name"], columns["status"])])
@@ -72,7 +72,7 @@ def test_a_run_with_fits_leaves_parameters_numbers_and_a_curve(machine: Path) ->
     assert "Keff" in printed
     kinds = {json.loads(line)["kind"] for line in (out / "events.jsonl").read_text().splitlines()}
     assert "fit-resumed" in kinds
-    assert (out / "bode.png").read_bytes() != (plain / "bode.png").read_bytes()
+    assert (out / "bode.svg").read_bytes() != (plain / "bode.svg").read_bytes()
     assert not (plain / "parameters.parquet").exists()
 
 

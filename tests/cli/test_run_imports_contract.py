@@ -20,7 +20,8 @@ HEAVY = SERVERS | {
     "duckdb",
     "pyarrow",
     "scipy",
-    "matplotlib.pyplot",
+    "matplotlib",
+    "PIL",
 }
 MODELS = {"pydantic", "pydantic_core", "annotated_types", "importlib.metadata"}
 OPTIONS = "--excitation w --input u --output y --lines 50,100,200 --window 100 --time t"
@@ -55,8 +56,8 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "run"
 
 
-def test_a_run_with_pictures_loads_neither_scipy_nor_pyplot_nor_a_server(run: Path, tmp_path: Path) -> None:
-    assert (run / "bode.png").exists()
+def test_a_run_with_pictures_loads_neither_scipy_nor_matplotlib_nor_a_server(run: Path, tmp_path: Path) -> None:
+    assert (run / "bode.svg").exists()
     log = write_parquet(tmp_path / "log.parquet", signals())
     unused = HEAVY - {"pyarrow", "asyncio", "http.client", "ssl"}  # PyArrow reads the log, and loads them
     assert not loaded(f"run {log} --out {tmp_path / 'run'} {OPTIONS}") & unused
@@ -64,12 +65,12 @@ def test_a_run_with_pictures_loads_neither_scipy_nor_pyplot_nor_a_server(run: Pa
 
 @pytest.mark.parametrize("command", ["fit {}", "fit {} --json", "export {} --to csv --out {}.csv --force"])
 def test_a_command_on_a_run_loads_neither_models_nor_a_server(command: str, run: Path) -> None:
-    assert not loaded(command.format(run, run)) & (HEAVY | MODELS | {"matplotlib"})
+    assert not loaded(command.format(run, run)) & (HEAVY | MODELS)
 
 
 def test_an_inspection_loads_neither_models_nor_pictures(tmp_path: Path) -> None:
     log = write_csv(tmp_path / "log.csv", signals())
-    assert not loaded(f"inspect {log}") & (HEAVY | MODELS | {"matplotlib"})
+    assert not loaded(f"inspect {log}") & (HEAVY | MODELS)
 
 
 def test_a_report_loads_no_server_and_no_scipy(run: Path) -> None:

@@ -27,10 +27,10 @@ def log(tmp_path: Path) -> Path:
 def test_the_run_directory_holds_what_the_tracker_gives(log: Path, tmp_path: Path) -> None:
     out = tmp_path / "run"
     lines = ("--lines", "50,100,200", "--window", 100)
-    result = livebode("run", log, *JOINT, "--schedule", "t", *lines, "--hop", 7, "--out", out, pictures=True)
+    result = livebode("run", log, *JOINT, "--schedule", "t", *lines, "--hop", 7, "--out", out)
     assert (result.code, result.err) == (0, "")
     assert sorted(p.name for p in out.iterdir()) == [
-        "bode.png", "events.jsonl", "manifest.jsonl", "responses.parquet", "run-copy.json", "run.json", "tracking.png",
+        "bode.svg", "events.jsonl", "manifest.jsonl", "responses.parquet", "run-copy.json", "run.json", "tracking.svg",
     ]  # fmt: skip
     columns = signals()
     block = Block(np.array([columns[n] for n in "wuyt"]), tuple("wuyt"), RATE_HZ)

@@ -152,7 +152,7 @@ def test_a_full_disk_is_reported_with_the_directory_that_is_full(temporary: Path
 
 
 def test_an_upload_that_fails_leaves_no_run_there_and_the_local_one_here(tmp_path: Path) -> None:
-    files = ("bode.png", "run.json")
+    files = ("bode.svg", "run.json")
     for name in files:
         (tmp_path / name).write_text(name)
     with (

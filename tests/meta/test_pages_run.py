@@ -56,7 +56,7 @@ def desk(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Desk]:
     plt.close("all")
 
 
-def run(step: Step, desk: Desk, names: dict[str, Any], pictures: bool = False) -> set[Path]:
+def run(step: Step, desk: Desk, names: dict[str, Any]) -> set[Path]:
     """Run it, unless another page has run the same command, and give the files that it creates."""
     if step.text in desk.created:
         return desk.created[step.text]
@@ -66,7 +66,7 @@ def run(step: Step, desk: Desk, names: dict[str, Any], pictures: bool = False) -
     else:
         program, *words = step.words
         assert program == "livebode", f"{step.text}: mark what is not run with its reason"
-        result = livebode(*words, pictures=pictures)
+        result = livebode(*words)
         assert result.code == step.code, f"livebode {' '.join(words)}\n{result.err}"
     created = desk.files() - before
     if not step.python:

@@ -1,4 +1,4 @@
-"""What stands in the pictures is what was measured: read back from the drawn artists and the terminal's characters."""
+"""What is in the pictures is what was measured: read back from their marks and the terminal's characters."""
 
 from __future__ import annotations
 
@@ -7,10 +7,21 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from livebode.cli.pictures import tracked_amount
 from livebode.core import CIRCLE_FACTOR, COVERAGE, Lines, Responses
-from livebode.pictures import bode_figure, quantiles, spread, terminal_bode, tracking_figure, unwrapped, with_holes
+from livebode.pictures import (
+    Bars,
+    Cells,
+    bode_figure,
+    quantiles,
+    spread,
+    terminal_bode,
+    tracking_figure,
+    unwrapped,
+    with_holes,
+)
 from livebode.pictures.tracking import is_falling
 from livebode.preparation import ChannelCheck
 from livebode.runtime.run_counts import RunCounts
@@ -31,33 +42,34 @@ def resonant(lines: Lines = LINES, rows: int = 41, peak_hz: float = 60.0) -> Res
     )  # fmt: skip
 
 
-def drawn(axes, gid: str) -> list:
-    return [artist for artist in axes.get_children() if artist.get_gid() == gid]
+def drawn(panel, name: str) -> list:
+    return [mark for mark in panel.marks if getattr(mark, "name", "") == name]
 
 
 def test_the_bode_plot_draws_medians_and_the_newest_in_decibels_and_degrees() -> None:
     run = resonant()
-    magnitude, phase, coherence = bode_figure(run).axes
+    magnitude, phase, coherence = bode_figure(run).panels
     size_db = 20 * np.log10(np.abs(run.value))
-    np.testing.assert_allclose(drawn(magnitude, "median")[0].get_xydata()[:, 0], LINES.frequency_hz)
-    np.testing.assert_allclose(drawn(magnitude, "median")[0].get_ydata(), np.median(size_db, axis=0))
-    np.testing.assert_allclose(drawn(magnitude, "newest")[0].get_ydata(), size_db[-1])
+    np.testing.assert_allclose(drawn(magnitude, "median")[0].x, LINES.frequency_hz)
+    np.testing.assert_allclose(drawn(magnitude, "median")[0].y, np.median(size_db, axis=0))
+    np.testing.assert_allclose(drawn(magnitude, "newest")[0].y, size_db[-1])
     angle_deg = np.degrees(np.angle(run.value))  # −180 … 0 here, so the plain median is the circular one
-    np.testing.assert_allclose(drawn(phase, "median")[0].get_ydata(), np.median(angle_deg, axis=0))
-    np.testing.assert_allclose(drawn(phase, "newest")[0].get_ydata(), angle_deg[-1])
-    np.testing.assert_allclose(drawn(coherence, "median")[0].get_ydata(), 0.9)
-    assert "dB re 1 rad/N" in magnitude.get_ylabel()
+    np.testing.assert_allclose(drawn(phase, "median")[0].y, np.median(angle_deg, axis=0))
+    np.testing.assert_allclose(drawn(phase, "newest")[0].y, angle_deg[-1])
+    np.testing.assert_allclose(drawn(coherence, "median")[0].y, 0.9)
+    assert "dB re 1 rad/N" in magnitude.y.label
 
 
 def test_the_bars_reach_as_far_as_the_bound_of_the_stated_probability() -> None:
     assert pytest.approx(COVERAGE) == 1 - np.exp(-(CIRCLE_FACTOR**2))
     run = resonant()
-    magnitude, phase, _ = bode_figure(run).axes
+    magnitude, phase, _ = bode_figure(run).panels
     newest, radius = np.abs(run.value[-1]), run[len(run) - 1].bound()
-    bars = np.array([bar[:, 1] for bar in drawn(magnitude, "bound")[0].get_segments()])
-    np.testing.assert_allclose(bars, 20 * np.log10(np.column_stack([newest - radius, newest + radius])))
-    turns = np.array([bar[:, 1] for bar in drawn(phase, "bound")[0].get_segments()])
-    np.testing.assert_allclose(np.diff(turns)[:, 0] / 2, np.degrees(np.arcsin(radius / newest)))
+    (bars,), (turns,) = drawn(magnitude, "bound"), drawn(phase, "bound")
+    np.testing.assert_allclose(bars.low, 20 * np.log10(newest - radius))
+    np.testing.assert_allclose(bars.high, 20 * np.log10(newest + radius))
+    np.testing.assert_allclose((turns.high - turns.low) / 2, np.degrees(np.arcsin(radius / newest)))
+    assert isinstance(bars, Bars)
 
 
 def test_rows_that_are_not_valid_change_nothing() -> None:
@@ -65,9 +77,9 @@ def test_rows_that_are_not_valid_change_nothing() -> None:
     bad = np.zeros(run.valid.shape, dtype=bool)
     bad[30:] = True
     spoilt = replace(run, value=np.where(bad, 1e9, run.value), valid=~bad)
-    for one, other in zip(bode_figure(spoilt).axes, bode_figure(run[:30]).axes):
-        for gid in ("median", "newest"):
-            np.testing.assert_array_equal(drawn(one, gid)[0].get_xydata(), drawn(other, gid)[0].get_xydata())
+    for one, other in zip(bode_figure(spoilt).panels, bode_figure(run[:30]).panels):
+        for name in ("median", "newest"):
+            np.testing.assert_array_equal(drawn(one, name)[0].y, drawn(other, name)[0].y)
 
 
 def test_frequencies_are_plain_numbers() -> None:
@@ -75,9 +87,9 @@ def test_frequencies_are_plain_numbers() -> None:
         (LINES, ["20", "40", "60", "80", "100", "120", "140"]),
         (Lines.parse("10:600:2.5", rate_hz=4000, window=1600), ["10", "20", "50", "100", "200", "500"]),
     ):
-        axes = bode_figure(resonant(lines)).axes[-1]
-        assert [label.get_text() for label in axes.get_xticklabels()] == expected
-        assert [label.get_text() for label in axes.get_xticklabels(minor=True) if label.get_text()] == []
+        upper, *_, lowest = bode_figure(resonant(lines)).panels
+        assert list(lowest.x.texts) == expected
+        assert not upper.x.texts
 
 
 def test_the_phase_is_unwrapped_and_lines_drowned_in_noise_do_not_wind_it_up() -> None:
@@ -94,8 +106,8 @@ def test_the_phase_is_unwrapped_and_lines_drowned_in_noise_do_not_wind_it_up() -
 
 def test_the_median_phase_around_half_a_turn_is_not_zero() -> None:
     angle_deg = -180 + 10 * np.sin(np.arange(41))[:, np.newaxis] * np.ones(7)
-    phase = bode_figure(replace(resonant(), value=np.exp(1j * np.radians(angle_deg)))).axes[1]
-    np.testing.assert_allclose(drawn(phase, "median")[0].get_ydata(), np.median(angle_deg))
+    phase = bode_figure(replace(resonant(), value=np.exp(1j * np.radians(angle_deg)))).panels[1]
+    np.testing.assert_allclose(drawn(phase, "median")[0].y, np.median(angle_deg))
 
 
 def test_quantiles_are_numpys_without_the_holes() -> None:
@@ -109,18 +121,16 @@ def test_tracking_draws_each_line_against_time_with_gaps_and_its_bound() -> None
     run = resonant()
     valid = run.valid.copy()
     valid[10:15, 2] = False
-    figure = tracking_figure(replace(run, valid=valid, schedule=np.full(41, np.nan)))
-    (axes,) = figure.axes
-    traces = drawn(axes, "magnitude")
+    (panel,) = tracking_figure(replace(run, valid=valid, schedule=np.full(41, np.nan))).panels
+    traces, bands = drawn(panel, "magnitude"), drawn(panel, "bound")
     expected = np.where(valid, run.magnitude_db, np.nan)
-    for i, trace in enumerate(traces):
-        np.testing.assert_allclose(trace.get_xdata(), run.time_s)
-        np.testing.assert_allclose(trace.get_ydata(), expected[:, i])
-    bands = [band.get_datalim(axes.transData) for band in drawn(axes, "bound")]
-    for i, band in enumerate(bands):
-        assert band.y0 == pytest.approx(np.nanmin(expected[:, i]) + 20 * np.log10(1 - 0.02 * CIRCLE_FACTOR))
-        assert band.y1 == pytest.approx(np.nanmax(expected[:, i]) + 20 * np.log10(1 + 0.02 * CIRCLE_FACTOR))
-    assert {text.get_text() for text in axes.texts} == {f"{f:g} Hz" for f in LINES.frequency_hz}
+    for i, (trace, band) in enumerate(zip(traces, bands, strict=True)):
+        np.testing.assert_allclose(trace.x, run.time_s)
+        np.testing.assert_allclose(trace.y, expected[:, i])
+        np.testing.assert_allclose(band.low, expected[:, i] + 20 * np.log10(1 - 0.02 * CIRCLE_FACTOR))
+        np.testing.assert_allclose(band.high, expected[:, i] + 20 * np.log10(1 + 0.02 * CIRCLE_FACTOR))
+    assert [end.text for end in panel.ends] == [f"{f:g} Hz" for f in LINES.frequency_hz]
+    np.testing.assert_allclose([end.value for end in panel.ends], expected[-1])
 
 
 def test_no_trace_is_drawn_across_a_hole_in_time() -> None:
@@ -131,29 +141,39 @@ def test_no_trace_is_drawn_across_a_hole_in_time() -> None:
 
 def test_forward_and_return_strokes_have_their_own_curves() -> None:
     run = resonant()
-    figure = tracking_figure(run, schedule_name="position in m")
-    place = figure.axes[0]
-    assert place.get_xlabel() == "position in m"
+    place = tracking_figure(run, schedule_name="position in m").panels[0]
+    assert place.x.label == "position in m"
     falling = is_falling(run.schedule)
     np.testing.assert_array_equal(falling[1:9], False)
     np.testing.assert_array_equal(falling[11:19], True)
     np.testing.assert_array_equal(is_falling(np.array([3.0, 3, 2, 2, 5])), [True, True, True, True, False])
-    for gid, at in (("rising", ~falling), ("falling", falling)):
-        np.testing.assert_allclose(drawn(place, gid)[1].get_ydata(), run.magnitude_db[at, 1])
+    for name, at in (("rising", ~falling), ("falling", falling)):
+        np.testing.assert_allclose(drawn(place, name)[1].y, run.magnitude_db[at, 1])
 
 
 def test_many_lines_become_maps_of_the_same_numbers() -> None:
     run = resonant(Lines.parse("20:120:5", rate_hz=4000, window=800))
     valid = run.valid.copy()
     valid[5:9] = False
-    level, change = (
-        axes.collections[0].get_array()
-        for axes in tracking_figure(replace(run, valid=valid, schedule=np.full(41, np.nan))).axes
-        if axes.get_ylabel() == "frequency in Hz"
-    )
+    figure = tracking_figure(replace(run, valid=valid, schedule=np.full(41, np.nan)))
+    (level,), (change,) = figure.marks("level"), figure.marks("change")
+    assert isinstance(level, Cells)
+    assert isinstance(change, Cells)
     expected = np.where(valid, run.magnitude_db, np.nan)
-    np.testing.assert_allclose(level.filled(np.nan), expected.T)
-    np.testing.assert_allclose(change.filled(np.nan), (expected - np.nanmedian(expected, axis=0)).T)
+    np.testing.assert_allclose(level.values, expected)
+    np.testing.assert_allclose(change.values, expected - np.nanmedian(expected, axis=0))
+
+
+def test_a_plot_of_matplotlib_and_the_picture_of_a_run_show_the_same_numbers() -> None:
+    run = resonant()
+    axes = run.plot("bode", axes=Figure().subplots(2))
+    for plotted, panel in zip(axes, bode_figure(run).panels):
+        (newest,) = drawn(panel, "newest")
+        (curve,) = (line for line in plotted.lines if len(line.get_xdata()) == len(LINES))
+        np.testing.assert_allclose(curve.get_ydata(), newest.y)
+        (bars,) = drawn(panel, "bound")
+        ends = np.array([stroke[:, 1] for stroke in plotted.collections[-1].get_segments()])
+        np.testing.assert_allclose(ends, np.column_stack([bars.low, bars.high]))
 
 
 def test_labels_keep_their_distance_and_their_order() -> None:

@@ -19,10 +19,9 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from matplotlib.figure import Figure
 
 from livebode.core import DamageWarning, LivebodeError, RecordError
-from livebode.pictures import save, style
+from livebode.pictures import Figure, save_svg
 from livebode.records import RunDirectory, RunRecord, query, read_bytes
 from livebode.records.segments.json_lines import to_line
 from livebode.records.summary_file import to_document
@@ -37,7 +36,7 @@ SECRET = 4_242_424_242
 LINKS = (
     "events.jsonl", "manifest.jsonl", "run.json", "run-copy.json", "responses", "samples", "open", "damaged",
     "responses/000001.parquet", "samples/000001.parquet", "open/000002.journal", ".run.json.partial",
-    ".run-copy.json.partial", "open/.000003.journal.partial", ".pictures.partial", "bode.png",
+    ".run-copy.json.partial", "open/.000003.journal.partial", ".pictures.partial", "bode.svg",
 )  # fmt: skip
 
 
@@ -208,10 +207,10 @@ def test_a_directory_in_place_of_a_file_is_refused_and_not_left_open(tmp_path: P
 
 def test_a_picture_replaces_a_link_and_not_what_it_names(tmp_path: Path) -> None:
     (tmp_path / "thesis.tex").write_text("years of work")
-    (tmp_path / "margins.png").symlink_to(tmp_path / "thesis.tex")
-    save(Figure(), tmp_path / "margins.png", style(False))
+    (tmp_path / "margins.svg").symlink_to(tmp_path / "thesis.tex")
+    save_svg(Figure("", (), (), (), 100.0), tmp_path / "margins.svg")
     assert (tmp_path / "thesis.tex").read_text() == "years of work"
-    assert not (tmp_path / "margins.png").is_symlink()
+    assert not (tmp_path / "margins.svg").is_symlink()
 
 
 def test_a_segment_that_expands_beyond_reason_is_named_and_left_out(
@@ -256,7 +255,7 @@ def test_a_broken_summary_ends_in_a_sentence(tmp_path: Path, runs: dict[str, Pat
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", DamageWarning)
             for one in asked:
-                done = livebode(*one, pictures=one[0] == "margins")
+                done = livebode(*one)
                 assert "Traceback" not in done.err, (one[0], data[:4000])
                 assert done.code in (0, 2, 3)
 

@@ -15,7 +15,7 @@ def test_every_file_that_the_page_names_is_removed_with_the_run(tmp_path: Path) 
     table = re.search(r"\| file \|.*?\n\n", PAGE.read_text("utf-8"), re.S)
     assert table is not None
     names = set(re.findall(r"`([a-z-]+\.[a-z]+)`", table[0]))
-    assert {"run.json", "tune.json", "loop-check.json", "filters.st", "friction.png"} <= names
+    assert {"run.json", "tune.json", "loop-check.json", "filters.st", "friction.svg"} <= names
     for name in names:
         (tmp_path / name).touch()
     (tmp_path / "thesis.tex").touch()

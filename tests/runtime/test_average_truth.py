@@ -86,12 +86,10 @@ def healthy(seed: int) -> Responses:
     return averaged(recorded(seed, 12))
 
 
-def run(folder: Path, samples: np.ndarray, *options: object, pictures: bool = False) -> tuple[livebode.Run, str, str]:
+def run(folder: Path, samples: np.ndarray, *options: object) -> tuple[livebode.Run, str, str]:
     pq.write_table(pa.table(dict(zip("wuy", samples))), folder / "log.parquet")
     roles = ("--excitation", "w", "--input", "u", "--output", "y", "--rate", RATE_HZ, "--window", WINDOW)
-    done = command(
-        "run", folder / "log.parquet", *roles, "--average", *options, "--out", folder / "run", pictures=pictures
-    )
+    done = command("run", folder / "log.parquet", *roles, "--average", *options, "--out", folder / "run")
     assert done.code == 0, done.err
     return livebode.Run(folder / "run"), done.out, done.err
 
@@ -109,12 +107,12 @@ def test_all_periods_of_a_recording_are_averaged(tmp_path: Path) -> None:
 
 def test_what_is_drawn_and_printed_is_that_average(tmp_path: Path) -> None:
     """The picture has the bytes of one that is drawn from `Run.average` alone."""
-    found, out, _ = run(tmp_path, recorded(2, 24, softer=0.02), pictures=True)
+    found, out, _ = run(tmp_path, recorded(2, 24, softer=0.02))
     assert "plant G: average over 12 s" in out
     (tmp_path / "again").mkdir()
     title = f"{(tmp_path / 'log.parquet').name}: y"
     save_pictures(Responses.of(found.average), tmp_path / "again", title=title, names=("u", "y"), mean=found.average)
-    assert (tmp_path / "again" / "bode.png").read_bytes() == (tmp_path / "run" / "bode.png").read_bytes()
+    assert (tmp_path / "again" / "bode.svg").read_bytes() == (tmp_path / "run" / "bode.svg").read_bytes()
 
 
 def test_the_bounds_of_an_average_cover() -> None:

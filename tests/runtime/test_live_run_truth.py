@@ -50,7 +50,7 @@ def test_ctrl_c_leaves_a_whole_run_with_its_gaps(tmp_path):
 
     with (
         Machine(tmp_path) as peer,
-        started(axis(tmp_path, f'url = "{peer.settings["url"]}"'), tmp_path / "live", pictures=True) as process,
+        started(axis(tmp_path, f'url = "{peer.settings["url"]}"'), tmp_path / "live") as process,
     ):
         peer.wait_ready()
         for at, batch in enumerate(sent()):
@@ -67,7 +67,7 @@ def test_ctrl_c_leaves_a_whole_run_with_its_gaps(tmp_path):
     assert summary["counts"]["missing"] == summary["source"]["lost"] == 80
     events = [json.loads(line) for line in (tmp_path / "live" / "events.jsonl").read_text().splitlines()]
     assert [event["kind"] for event in events] == ["connected", "loss", "gap"]
-    assert (tmp_path / "live" / "bode.png").is_file()
+    assert (tmp_path / "live" / "bode.svg").is_file()
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])

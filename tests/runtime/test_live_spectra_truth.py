@@ -137,7 +137,7 @@ def run_live(
     with of_spectra(kind, folder, sent[0].layout) as peer:
         path = folder / f"{name}.toml"
         path.write_text(f'[source]\nurl = "{peer.settings["url"]}"\n{config}')
-        with started(path, folder / name, pictures=True) as process:
+        with started(path, folder / name) as process:
             peer.wait_ready()
             for batch in sent:
                 peer.send(batch)
@@ -185,7 +185,7 @@ def test_a_run_on_spectra_is_the_run_on_the_samples(tmp_path: Path, kind: type[P
     assert summary["found"]["from"] == "spectra"
     assert summary["found"]["quiet_bins"] == list(LINES.quiet)
     assert summary["source"]["lost"] == 0
-    assert (out / "bode.png").is_file()
+    assert (out / "bode.svg").is_file()
     if kind is TcpPeer:
         mine, other = (table(folder, "parameters") for folder in (out, tmp_path / "recorded"))
         assert mine.keys() == other.keys()

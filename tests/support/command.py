@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from unittest import mock
@@ -27,33 +27,10 @@ class Result:
     err: str
 
 
-_DRAWN = {
-    "design": (
-        "livebode_design.excitation_picture.save_excitation_picture",
-        "livebode_design.matrix.matrix_picture.save_matrix_excitation_picture",
-    ),
-    "margins": ("livebode_control.margins.loop_picture.save_loop_picture",),
-    "tune": ("livebode_control.proposal.tuning_picture.save_tuning_picture",),
-    "validate": ("livebode_control.validation.validation_picture.save_validation_picture",),
-}
-"""By command: what draws the picture beside its results."""
-
-
-@contextlib.contextmanager
-def no_pictures(command: object = "run") -> Iterator[None]:
-    """A command ends without its pictures, which take up to four fifths of its time and are drawn alike for any."""
-    drawn = ("livebode.pictures.save_pictures", "livebode.pictures.save_matrix_pictures")
-    with contextlib.ExitStack() as stack:
-        for name in (*drawn, *_DRAWN.get(str(command), ())):
-            stack.enter_context(mock.patch(name, return_value=None))
-        yield
-
-
-def livebode(*arguments: object, pictures: bool = False) -> Result:
-    """`livebode` with these arguments, as its entry point would be called; `pictures`: with those that it draws."""
+def livebode(*arguments: object) -> Result:
+    """`livebode` with these arguments, as its entry point would be called."""
     out, err, code = io.StringIO(), io.StringIO(), 0
     with (
-        contextlib.nullcontext() if pictures else no_pictures(*arguments[:1]),
         contextlib.redirect_stdout(out),
         contextlib.redirect_stderr(err),
         mock.patch.object(sys, "argv", ["livebode", *map(str, arguments)]),

@@ -19,13 +19,11 @@ from multiprocessing.context import ForkServerContext
 from pathlib import Path
 from typing import BinaryIO, Self
 
-from tests.support.command import no_pictures
-
 _IMPORTED = [
     "livebode.cli.app", "livebode.cli.run_command", "livebode.cli.serving", "livebode.pictures.bode",
     "livebode.pictures.tracking", "livebode.runtime._run", "livebode.runtime._demo", "livebode.sources.live.lines",
     "livebode_plant.fleet.sink", "livebode_plant.fleet.worker",
-    "matplotlib.backends.backend_agg", "matplotlib.figure", "nats.aio.client", "pyarrow.parquet", "scipy.optimize",
+    "nats.aio.client", "pyarrow.parquet", "scipy.optimize",
     "scipy.signal",
     "tests.support.forked", "tests.support.killed", "tests.support.killed_live",
 ]  # fmt: skip
@@ -39,12 +37,12 @@ def server() -> ForkServerContext:
 
 
 class Command:
-    """`livebode` with these arguments, and what of subprocess.Popen the tests use; `pictures`: with those of a run.
+    """`livebode` with these arguments, and what of subprocess.Popen the tests use.
 
     With the descriptor of a `terminal`, all three streams are that.
     """
 
-    def __init__(self, *arguments: object, pictures: bool = False, terminal: int | None = None) -> None:
+    def __init__(self, *arguments: object, terminal: int | None = None) -> None:
         self._folder = tempfile.TemporaryDirectory(prefix="livebode-command-")
         self._printed = [Path(self._folder.name, name) for name in ("out", "err")]
         read, write = server().Pipe(duplex=False)
@@ -55,7 +53,7 @@ class Command:
             read = Connection(os.dup(terminal))
         here = (list(map(str, arguments)), dict(os.environ), os.getcwd())
         printed = self._printed if terminal is None else []
-        self._process = server().Process(target=_run, args=(read, printed, pictures, *here))
+        self._process = server().Process(target=_run, args=(read, printed, *here))
         self._process.start()
         read.close()
 
@@ -121,7 +119,6 @@ class Command:
 def _run(
     given: Connection,
     printed: list[Path],
-    pictures: bool,
     arguments: list[str],
     environment: dict[str, str],
     directory: str,
@@ -144,5 +141,4 @@ def _run(
     sys.argv = ["livebode", *arguments]
     from livebode.cli import main
 
-    with contextlib.nullcontext() if pictures else no_pictures():
-        main()
+    main()

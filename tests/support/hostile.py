@@ -24,12 +24,12 @@ NAMES = (
 )  # fmt: skip
 """Names of somebody else's files; some are nearly those of livebode."""
 OWN_NAMES = (
-    "run.json", "events.jsonl", "manifest.jsonl", "responses.parquet", "bode.png", "report.html", "gains.toml",
+    "run.json", "events.jsonl", "manifest.jsonl", "responses.parquet", "bode.svg", "report.html", "gains.toml",
     "shaper.h", "filters.h", "tune.json", "notes.json", "responses", "samples", "open", "damaged",
     "open/000001.journal", "axis.toml", "responses/000001.parquet", ".run.json.partial", ".pictures.partial",
     "design.json", "excitation.csv", "MAIN.st", "tables", "tables/runs", "tables/responses",
-    "tables/runs/_delta_log", "tables/events", "tables/fleet_events", "a.csv", "excitation.png", "axis.schema.json",
-    "tables/fleet_responses/_delta_log", ".pictures.partial/bode.png",
+    "tables/runs/_delta_log", "tables/events", "tables/fleet_events", "a.csv", "excitation.svg", "axis.schema.json",
+    "tables/fleet_responses/_delta_log", ".pictures.partial/bode.svg",
 )  # fmt: skip
 """Places of livebode's files."""
 
@@ -39,7 +39,7 @@ def write_outside(place: Path) -> None:
     for name in ("", "responses", "open", "_delta_log", "deep/er"):
         (place / name).mkdir(parents=True, exist_ok=True)
     for name in (
-        *NAMES, "victim", "run.json", "events.jsonl", "bode.png", "responses/000001.parquet", "open/000001.journal",
+        *NAMES, "victim", "run.json", "events.jsonl", "bode.svg", "responses/000001.parquet", "open/000001.journal",
         "deep/er/x", "_delta_log/00000000000000000000.json",
     ):  # fmt: skip
         (place / name).write_bytes(PRECIOUS)

@@ -31,9 +31,9 @@ def axis(folder: Path, source: str, rest: str = SMALL_AXIS) -> Path:
     return path
 
 
-def started(path: Path, out: Path, pictures: bool = False) -> Command:
+def started(path: Path, out: Path) -> Command:
     """The process of this run; it does not outlive the test, also where a wait for it times out."""
-    return Command("run", path, "--out", out, "--json", pictures=pictures)
+    return Command("run", path, "--out", out, "--json")
 
 
 def table(out: Path, what: str = "responses") -> dict[str, np.ndarray]:

@@ -34,11 +34,11 @@ def source(machine: Machine) -> str:
 class Running:
     """The command on a file of ours, that may be edited."""
 
-    def __init__(self, folder: Path, text: str, *options: str, log_level: str = "", pictures: bool = False) -> None:
+    def __init__(self, folder: Path, text: str, *options: str, log_level: str = "") -> None:
         self.file, self.out = folder / "axes.toml", folder / "run"
         self.write(text)
         log = ("--log-level", log_level) if log_level else ()
-        self.process = Command(*log, "run", self.file, "--out", self.out, "--json", *options, pictures=pictures)
+        self.process = Command(*log, "run", self.file, "--out", self.out, "--json", *options)
 
     def __enter__(self) -> Running:
         return self

@@ -17,7 +17,7 @@ def on_terminal(
     """Exit code of `livebode`, and all that it writes; each answer is given when the terminal shows its question."""
     reader, terminal = pty.openpty()
     with mock.patch.dict(os.environ, {"TERM": kind, "COLUMNS": str(columns)}):
-        process = Command(*arguments, pictures=True, terminal=terminal)
+        process = Command(*arguments, terminal=terminal)
     os.close(terminal)
     shown, at, rest = b"", 0, list(answers)
     with process:

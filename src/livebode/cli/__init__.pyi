@@ -18,11 +18,8 @@ from livebode.cli.options import ReportLanguage as ReportLanguage
 from livebode.cli.options import ServeFile as ServeFile
 from livebode.cli.options import check_use as check_use
 from livebode.cli.options import parsed_band as parsed_band
-from livebode.cli.pictures import can_draw as can_draw
 from livebode.cli.pictures import margins_in_short as margins_in_short
-from livebode.cli.pictures import one_drawing_at_a_time as one_drawing_at_a_time
 from livebode.cli.pictures import show_monitoring as show_monitoring
-from livebode.cli.pictures import tell_how_to_draw as tell_how_to_draw
 from livebode.cli.pictures import tracked_amount as tracked_amount
 from livebode.cli.query_result import Csv as Csv
 from livebode.cli.query_result import RowsMax as RowsMax

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import os
 import sys
-import threading
-from importlib import import_module
-from importlib.util import find_spec
 from math import isnan
 from pathlib import Path
 from shutil import get_terminal_size
 from typing import TYPE_CHECKING, Any
 
 from livebode.cli.terminal import is_terminal, print_drawn
-from livebode.core import RunClock, counted, install_command, moment, moments_by, with_bound
+from livebode.core import RunClock, counted, moment, moments_by, with_bound
 from livebode.estimates import rule
 from livebode.language import QUANTITY_NAMES, quantity_name
 from livebode.locations import original
@@ -23,24 +20,7 @@ if TYPE_CHECKING:
     from livebode.runtime import Estimate, Outcome, SingleResponse
 
 
-def can_draw() -> bool:
-    """Whether Matplotlib is installed."""
-    return find_spec("matplotlib") is not None
-
-
-def tell_how_to_draw() -> None:
-    """Print how to get pictures, where there are none."""
-    if not can_draw():
-        print(f"no pictures, because Matplotlib is not installed; run {install_command('plots')}")
-
-
 _ALARMS_SHOWN = 8
-_ONE_AT_A_TIME = threading.Lock()
-
-
-def one_drawing_at_a_time() -> threading.Lock:
-    """The lock for drawing, because Matplotlib's settings belong to the whole process."""
-    return _ONE_AT_A_TIME
 
 
 def draw(estimate: Estimate, into: Path) -> None:
@@ -51,7 +31,7 @@ def draw(estimate: Estimate, into: Path) -> None:
 
 
 def draw_response(estimate: SingleResponse, into: Path) -> None:
-    """Draw bode.png and tracking.png of an axis, if Matplotlib is installed."""
+    """Draw bode.svg and tracking.svg of an axis."""
     axis = estimate.axis
     assert axis is not None
     names = (axis.signals.input or axis.signals.excitation or "", axis.signals.output)
@@ -59,26 +39,14 @@ def draw_response(estimate: SingleResponse, into: Path) -> None:
 
 
 def draw_titled(estimate: SingleResponse, into: Path, *, title: str, names: tuple[str, str]) -> None:
-    """Draw bode.png and tracking.png with this title and names of input and output, if Matplotlib is installed."""
+    """Draw bode.svg and tracking.svg with this title and names of input and output."""
     responses = estimate.overview.responses()
-    if not len(responses) or not can_draw():
+    if not len(responses):
         return
-    from livebode.pictures import save_pictures  # with Matplotlib half a second to import
+    from livebode.pictures import save_pictures
 
     schedule, fitted, mean = estimate.schedule_label, estimate.fit, estimate.average
-    with _ONE_AT_A_TIME:
-        save_pictures(responses, into, title=title, schedule_name=schedule, names=names, fitted=fitted, mean=mean)
-
-
-def load_beside() -> None:
-    """Load Matplotlib in a thread: a second processor has time while a recording is examined and tracked."""
-    if can_draw():
-        threading.Thread(target=_load_matplotlib, name="matplotlib").start()
-
-
-def _load_matplotlib() -> None:
-    for module in ("matplotlib.backends.backend_agg", "matplotlib.figure"):
-        import_module(module)
+    save_pictures(responses, into, title=title, schedule_name=schedule, names=names, fitted=fitted, mean=mean)
 
 
 def show(outcome: Outcome) -> None:
@@ -114,7 +82,6 @@ def show(outcome: Outcome) -> None:
         _show_loop(outcome.summary["loop"])
     if "monitoring" in outcome.summary:
         show_monitoring(outcome.summary["monitoring"])
-    tell_how_to_draw()
 
 
 _LINES_SHOWN = 20

@@ -23,7 +23,7 @@ from livebode.cli.failures import exit_code_of
 from livebode.cli.next_step import NextCommand
 from livebode.cli.notices import NoticePrinter, PercentPrinter
 from livebode.cli.options import parsed_band
-from livebode.cli.pictures import draw, load_beside, tell_how_to_draw, tracked_amount
+from livebode.cli.pictures import draw, tracked_amount
 from livebode.cli.remote import recorded_at
 from livebode.cli.shell import command_line
 from livebode.configuration import Axes, Axis, ConfigurationFile, ServeSection
@@ -294,8 +294,7 @@ def _run(
     """Track one recording."""
 
     def job(own: tuple[Subscriber, ...]) -> Outcome:
-        to = Destination(directory, draw, force, (*subscribers, *own))
-        return run(axis, _publishing_to(replace(to, prepare=load_beside), publisher, ""))
+        return run(axis, _publishing_to(Destination(directory, draw, force, (*subscribers, *own)), publisher, ""))
 
     return _with_progress(job, quiet)
 
@@ -399,8 +398,6 @@ def _run_axes(
             print(
                 f"{thread.name}: {tracked_amount(thread.outcome.summary)}\n{original(str(thread.outcome.directory))}/"
             )
-    if not as_json:
-        tell_how_to_draw()
     errors = [thread.error for thread in session.all if thread.error is not None and not thread.ended_early]
     if errors:
         raise typer.Exit(exit_code_of([error for error in errors if not isinstance(error, StoppedError)]))

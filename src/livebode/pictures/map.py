@@ -2,46 +2,29 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from livebode.arrays import Floats
 from livebode.core import Responses, decibels
-from livebode.language import tr
+from livebode.language import numerals, tr
 from livebode.pictures import ticks, words
-from livebode.pictures._style import Style, plain
 from livebode.pictures.curves import quantiles
-
-if TYPE_CHECKING:
-    from matplotlib.collections import QuadMesh
-    from matplotlib.figure import Figure
-    from matplotlib.gridspec import SubplotSpec
-
+from livebode.pictures.figure import ABOVE, BELOW, Cells, Panel, Scale, empty_scale, room, unlabelled, value_scale
 
 # About one cell for two pixels of the picture: finer cells cost time and show no more detail.
 _TIME_CELLS_MAX = 400
 _SCHEDULE_CELLS_MAX = 80
 _LINE_CELLS_MAX = 250
+_HEIGHT, _BETWEEN = 190.0, 12.0
+BAR = 14.0
+"""Width of a bar of colours."""
 
 
-def draw_maps(
-    figure: Figure, look: Style, responses: Responses, use: NDArray[np.bool_], schedule: str | None, left: float
-) -> None:
-    """Draw two rows of maps (magnitude above, change below) over the schedule, if any, and over time."""
-    width_in, height_in = figure.get_size_inches()
-    grid = figure.add_gridspec(
-        2,
-        3 if schedule else 2,
-        width_ratios=[1, 1, 0.028] if schedule else [1, 0.02],
-        left=left,
-        right=1 - 0.85 / width_in,
-        top=1 - 0.8 / height_in,
-        bottom=0.52 / height_in,
-        hspace=0.07,
-        wspace=0.07,
-    )
+def maps(responses: Responses, use: NDArray[np.bool_], schedule: str | None) -> tuple[list[Panel], float]:
+    """Two rows of maps (magnitude above, change below) over the schedule, if any, and over time; and their height."""
     frequency_hz, level_db = grouped_lines(
         responses.lines.frequency_hz, decibels(np.where(use, responses.value, np.nan))
     )
@@ -50,20 +33,70 @@ def draw_maps(
     across = [(responses.time_s - origin_s, _TIME_CELLS_MAX, time_label)]
     if schedule:
         across.insert(0, (responses.schedule, min(_SCHEDULE_CELLS_MAX, max(8, len(responses) // 5)), schedule))
-    shown = ((level_db, _level_colours(level_db)), (change_db, _change_colours(look, change_db)))
-    for row, (values, colours) in enumerate(shown):
-        meshes = [
-            _map(figure, look, grid[row, i], x, cells, frequency_hz, values, colours)
-            for i, (x, cells, _) in enumerate(across)
-        ]
-        axes = figure.axes[-len(meshes) :]
-        for i, panel in enumerate(axes):
-            panel.tick_params(axis="both", labelbottom=row == 1, labelleft=i == 0)
-            if row == 1:
-                panel.set_xlabel(across[i][2])
-        axes[0].set_ylabel(tr("frequency in Hz"))
-        name = words.magnitude_label(responses, 40) if row == 0 else tr("change from the median in dB")
-        _colour_bar(figure, grid[row, -1], meshes[-1], name, extend="neither" if row == 0 else "both")
+    level_label = words.magnitude_label(responses, 40)
+    rows: tuple[tuple[Literal["level", "change"], Floats, tuple[float, float], str], ...] = (
+        ("level", level_db, level_limits(level_db), level_label),
+        ("change", change_db, change_limits(change_db), tr("change from the median in dB")),
+    )  # fmt: skip
+    bars = [value_scale(*limits, label, 5) for _, _, limits, label in rows]
+    panels, top = [], 0.0
+    for i, (kind, values, *_) in enumerate(rows):
+        top += ABOVE
+        shown = [(gridded(x, values, cells), name) for x, cells, name in across]
+        panels += map_row(
+            shown, frequency_hz, bars[i], kind, top=top, right=588.0 - room(*bars), last=i == len(rows) - 1
+        )
+        top += _HEIGHT
+    return panels, top + BELOW
+
+
+def map_row(
+    shown: list[tuple[tuple[Floats, Floats], str]], frequency_hz: Floats, bar: Scale, kind: Literal["level", "change"],
+    *, top: float, right: float, last: bool,
+) -> list[Panel]:  # fmt: skip
+    """Maps beside each other, ((edges, cells), label) each, over one frequency, and the bar with their colours."""
+    edges_hz = frequency_edges(frequency_hz)
+    y = map_scale(frequency_hz, edges_hz)
+    left, limits = room(y), (bar.low, bar.high)
+    width = (right - BAR - left) / len(shown) - _BETWEEN
+    panels = []
+    for i, ((edges, cells), name) in enumerate(shown):
+        x = value_scale(edges[0], edges[-1], name, 7 // len(shown))
+        marks = [Cells(kind, (edges[0], edges[-1]), edges_hz, cells, limits, kind)]
+        place = left + i * (width + _BETWEEN)
+        x, beside = x if last else unlabelled(x), y if not i else unlabelled(y)
+        panels.append(Panel(place, top, width, _HEIGHT, x, beside, marks, grid=False))
+    return [*panels, colour_bar(bar, kind, right=right, top=top, height=_HEIGHT)]
+
+
+def colour_bar(bar: Scale, kind: Literal["level", "change"], *, right: float, top: float, height: float) -> Panel:
+    """The colours of maps with their numbers at the right."""
+    values = np.linspace(bar.low, bar.high, 256)
+    middles = (values[np.newaxis, 1:] + values[np.newaxis, :-1]) / 2
+    colours = Cells("bar", (0.0, 1.0), values, middles, (bar.low, bar.high), kind)
+    return Panel(right - BAR, top, BAR, height, empty_scale(), bar, [colours], right=True, grid=False)
+
+
+def map_scale(frequency_hz: Floats, edges_hz: Floats) -> Scale:
+    """Frequency from the lowest to the highest edge, at the lines where there is room."""
+    low, high = float(edges_hz[0]), float(edges_hz[-1])
+    major = ticks.line_ticks(frequency_hz, low, high, 8)
+    texts = [numerals(ticks.frequency_label(f)) for f in major]
+    return Scale(low, high, major, texts, logarithmic=True, label=tr("frequency in Hz"))
+
+
+def level_limits(level_db: Floats) -> tuple[float, float]:
+    """Limits that contain all cells."""
+    known = level_db[np.isfinite(level_db)]
+    low = float(known.min())
+    return low, max(float(known.max()), low + 0.1)
+
+
+def change_limits(change_db: Floats) -> tuple[float, float]:
+    """Limits symmetric around zero that contain 99 % of the cells, so that an outlier does not hide the rest."""
+    known = np.abs(change_db[np.isfinite(change_db)])
+    reach = max(float(np.quantile(known, 0.99)), 0.1)
+    return -reach, reach
 
 
 def grouped_lines(frequency_hz: Floats, values: Floats) -> tuple[Floats, Floats]:
@@ -105,52 +138,8 @@ def gridded(x: Floats, values: Floats, cells_max: int) -> tuple[Floats, Floats]:
 
 def frequency_edges(frequency_hz: Floats) -> Floats:
     """Edges of the cells on a logarithmic axis, half-way between the lines."""
+    if len(frequency_hz) == 1:
+        return np.asarray(frequency_hz[0] * np.array([0.9, 1.1]))
     log_hz = np.log(frequency_hz)
     middle = (log_hz[1:] + log_hz[:-1]) / 2
     return np.asarray(np.exp(np.concatenate([[2 * log_hz[0] - middle[0]], middle, [2 * log_hz[-1] - middle[-1]]])))
-
-
-def _map(
-    figure: Figure,
-    look: Style,
-    cell: SubplotSpec,
-    x: Floats,
-    cells_max: int,
-    frequency_hz: Floats,
-    values: Floats,
-    colours: dict[str, Any],
-) -> QuadMesh:
-    from matplotlib.ticker import FixedFormatter, FixedLocator, NullLocator
-
-    axes = figure.add_subplot(cell)
-    plain(axes, grid=False)
-    axes.set_facecolor(look.nothing)
-    edges, out = gridded(x, values, cells_max)
-    edges_hz = frequency_edges(frequency_hz)
-    axes.set_yscale("log")
-    mesh = axes.pcolormesh(edges, edges_hz, np.ma.masked_invalid(out.T), rasterized=True, **colours)
-    axes.set_ylim(edges_hz[0], edges_hz[-1])
-    major = ticks.frequency_ticks(edges_hz[0], edges_hz[-1], most=9)
-    axes.yaxis.set_major_locator(FixedLocator(major))
-    axes.yaxis.set_major_formatter(FixedFormatter([ticks.frequency_label(f) for f in major]))
-    axes.yaxis.set_minor_locator(NullLocator())
-    return mesh
-
-
-def _level_colours(level_db: Floats) -> dict[str, Any]:
-    known = level_db[np.isfinite(level_db)]
-    return {"cmap": "viridis", "vmin": float(known.min()), "vmax": max(float(known.max()), float(known.min()) + 0.1)}
-
-
-def _change_colours(look: Style, change_db: Floats) -> dict[str, Any]:
-    """Limits symmetric around zero that contain 99 % of the cells, so that an outlier does not hide the rest."""
-    known = np.abs(change_db[np.isfinite(change_db)])
-    reach = max(float(np.quantile(known, 0.99)), 0.1)
-    return {"cmap": look.change_map, "vmin": -reach, "vmax": reach}
-
-
-def _colour_bar(figure: Figure, cell: SubplotSpec, mesh: QuadMesh, label: str, extend: str) -> None:
-    bar = figure.colorbar(mesh, cax=figure.add_subplot(cell), extend=extend)
-    bar.outline.set_visible(False)
-    bar.set_label(label, size=9.5)
-    bar.ax.tick_params(length=3.0)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,25 +12,46 @@ from numpy.typing import NDArray
 from livebode.arrays import Floats
 from livebode.core import COVERAGE, REASONS, MatrixResponses, decibels, moment
 from livebode.language import tr, worded
-from livebode.pictures._style import Style, drawing, heading, new_figure, plain, shortened, style
-from livebode.pictures.curves import bound_db
-from livebode.pictures.plots import FEW_LINES, alone, bound
-from livebode.pictures.png import save
+from livebode.pictures._style import LIGHT, shortened
+from livebode.pictures.curves import Curve, bound_db, bound_deg
+from livebode.pictures.figure import (
+    ABOVE,
+    BELOW,
+    FEW_LINES,
+    TITLE,
+    WIDTH,
+    Band,
+    Bars,
+    Dots,
+    End,
+    Entry,
+    Figure,
+    Mark,
+    Note,
+    Panel,
+    Scale,
+    Shade,
+    Trace,
+    empty_scale,
+    frequency_scale,
+    limits_around,
+    phase_scale,
+    room,
+    stacked,
+    unlabelled,
+    value_scale,
+)
+from livebode.pictures.map import frequency_edges
+from livebode.pictures.vector import save_svg
 from livebode.pictures.words import lines_phrase
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+_DASHES = ("", "dashed", "dotted", "mixed")
+_ENTRY_WIDTH, _MAGNITUDE, _PHASE = 190.0, 120.0, 80.0
+_BETWEEN = 10.0
 
 
-_LEFT_IN, _RIGHT_IN, _TOP_IN, _BOTTOM_IN = 0.85, 0.2, 1.25, 0.55
-_DASHES = ((), (5, 2), (1.5, 1.5), (5, 2, 1.5, 2))
-
-
-def save_matrix_pictures(
-    responses: MatrixResponses, directory: str | PathLike[str], *, title: str = "", dark: bool = False
-) -> list[Path]:
-    """Write bode.png and singular-values.png to an existing directory and return their paths.
+def save_matrix_pictures(responses: MatrixResponses, directory: str | PathLike[str], *, title: str = "") -> list[Path]:
+    """Write bode.svg and singular-values.svg to an existing directory and return their paths.
 
     The same responses give the same bytes: the files contain no date and no version.
 
@@ -40,144 +60,118 @@ def save_matrix_pictures(
     OSError
         If a file cannot be written.
     """
-    look = style(dark)
-    with drawing(look):
-        pictures = {
-            "bode.png": matrix_figure(responses, title=title, dark=dark),
-            "singular-values.png": singular_values_figure(responses, title=title, dark=dark),
-        }
-        return [save(figure, Path(directory) / name, look) for name, figure in pictures.items()]
+    pictures = {
+        "bode.svg": matrix_figure(responses, title=title),
+        "singular-values.svg": singular_values_figure(responses, title=title),
+    }
+    return [save_svg(figure, Path(directory) / name) for name, figure in pictures.items()]
 
 
-def matrix_figure(
-    responses: MatrixResponses, *, title: str = "", dark: bool = False, width_in: float | None = None
-) -> Figure:
+def matrix_figure(responses: MatrixResponses, *, title: str = "") -> Figure:
     """A Bode plot of each entry: outputs down, inputs across, with the 95 % bounds of the newest matrix.
 
-    Lines at which a column is invalid are shaded in its plots, with the reason where there is none that is valid.
-    Without `width_in`, the width follows the number of inputs.
+    Lines at which a column is invalid are shaded in its plots, with the reason where there is none that is valid. The
+    width follows the number of inputs.
     """
-    look, (down, across) = style(dark), responses.value.shape[2:]
-    with drawing(look):
-        from livebode.pictures.scales import frequency_axis
-
-        width, height = width_in or max(9.0, 1.05 + 3.4 * across), 1.8 + 3.2 * down
-        figure = new_figure(width, height)
-        left = _LEFT_IN / width
-        heading(figure, look, title or tr("Bode plots"), _facts(responses), left)
-        _key(figure, look, left, bool((responses.reason != 0).any()))
-        panels = _panels(figure, down, across)
-        responses.plot(axes=panels, color=look.newest)
-        for o in range(down):
-            for i in range(across):
-                _entry(list(panels[2 * o : 2 * o + 2, i]), look, responses, (o, i))
-            _label(panels[2 * o, 0], responses.units[o] if responses.units else ("",))
-            panels[2 * o + 1, 0].set_ylabel(tr("phase in degrees"))
-        for axes in panels.ravel():
-            plain(axes)
-            frequency_axis(axes, responses.frequency_hz, labels=axes in panels[-1])
-        for axes in panels[-1]:
-            axes.set_xlabel(tr("frequency in Hz"))
-    return figure
+    down, across = responses.value.shape[2:]
+    curves = [[_Entry(responses, o, i) for i in range(across)] for o in range(down)]
+    scales = [(_row_scale([entry.db for entry in row], ""), _row_phase([entry.deg for entry in row])) for row in curves]
+    left = room(*(scale for pair in scales for scale in pair))
+    width = max(WIDTH, left + across * (_ENTRY_WIDTH + _BETWEEN) + 12.0)
+    one = (width - 12.0 - left) / across - _BETWEEN
+    x = frequency_scale(responses.frequency_hz, max(int(one / 60), 2))
+    panels: list[Panel] = []
+    top = 0.0
+    for o, row in enumerate(curves):
+        top += TITLE
+        for i, entry in enumerate(row):
+            place = left + i * (one + _BETWEEN)
+            panels += entry.panels(x, scales[o], place=place, top=top, width=one, last=o == down - 1, first=i == 0)
+        top += ABOVE + _MAGNITUDE + ABOVE + _PHASE
+    key = [Entry(tr("response; bounds of each entry alone: {percent:g} %", percent=100 * COVERAGE), LIGHT.newest)]
+    if (responses.reason != 0).any():
+        key.append(Entry(tr("not valid"), LIGHT.muted, "band"))
+    return Figure(title or tr("Bode plots"), _facts(responses), key, panels, top + BELOW, width)
 
 
-def singular_values_figure(responses: MatrixResponses, *, title: str = "", dark: bool = False) -> Figure:
+class _Entry:
+    """One entry of the newest matrix: its values in dB and degrees, (value, low, high) each."""
+
+    def __init__(self, responses: MatrixResponses, output: int, input: int) -> None:
+        newest = responses.entry(output, input).newest()
+        nothing = np.full(len(responses.frequency_hz), np.nan)
+        self.db = self.deg = (nothing, nothing, nothing)
+        if newest is not None:
+            use = newest.valid & np.isfinite(newest.value) & (newest.value != 0)
+            value, radius = np.where(use, newest.value, np.nan), np.where(use, newest.bound(), np.nan)
+            deg = Curve(newest.frequency_hz, value, radius, "", "").phase_deg
+            half = bound_deg(value, radius)
+            self.db, self.deg = (decibels(value), *bound_db(value, radius)), (deg, deg - half, deg + half)
+        self._of, self._output, self._input = responses, output, input
+        units = responses.units[output] if responses.units else ()
+        unit = units[input] if units else ""
+        self._label = f"dB re 1 {unit}" if unit else tr("magnitude in dB")  # symbols in every language
+
+    def panels(
+        self, x: Scale, scales: tuple[Scale, Scale], *, place: float, top: float, width: float, last: bool, first: bool
+    ) -> list[Panel]:
+        """Magnitude above phase; numbers at the left only, and below the last one."""
+        of, f = self._of, self._of.frequency_hz
+        invalid = ~of.valid[-1, :, self._input]
+        name = f"{of.inputs[self._input]} → {of.outputs[self._output]}"
+        shown = []
+        for number, (scale, (value, low, high)) in enumerate(zip(scales, (self.db, self.deg))):
+            marks: list[Mark] = [_shade(of, invalid), *_curve(f, value, low, high, LIGHT.newest)]
+            if invalid.all() and not number:
+                words = sorted({worded(REASONS[n]) for n in of.reason[-1, :, self._input]})
+                marks.append(Note(tr("not valid: {why}", why=", ".join(words))))
+            label = self._label if not number else tr("phase in degrees")
+            y = Scale(scale.low, scale.high, scale.ticks, scale.texts if first else (), label=label)
+            shown.append((y, marks, (_MAGNITUDE, _PHASE)[number]))
+        return stacked(x if last else unlabelled(x), shown, left=place, width=width, top=top, title=name)[0]
+
+
+def _curve(f: Floats, value: Floats, low: Floats, high: Floats, colour: str, dashes: str = "") -> list[Mark]:
+    """A curve with its bound, with a marker at few lines."""
+    line = Trace("value", f, value, colour, 1.2, dashes)
+    if len(f) > FEW_LINES:
+        return [Band("bound", f, low, high, colour, 0.28), line]
+    return [Bars("bound", f, low, high, colour), line, Dots("value", f, value, colour, 3.6)]
+
+
+def _row_scale(curves: list[tuple[Floats, Floats, Floats]], label: str) -> Scale:
+    limits = limits_around(
+        np.concatenate([c[0] for c in curves]), np.concatenate([np.append(*c[1:]) for c in curves]), 3.0
+    )
+    return value_scale(*limits, label, 5) if limits else empty_scale(label)
+
+
+def _row_phase(curves: list[tuple[Floats, Floats, Floats]]) -> Scale:
+    around = np.concatenate([np.append(*c[1:]) for c in curves])
+    limits = limits_around(np.concatenate([c[0] for c in curves]), around, 10.0)
+    return phase_scale(*limits, most=4) if limits else empty_scale(tr("phase in degrees"))
+
+
+def singular_values_figure(responses: MatrixResponses, *, title: str = "") -> Figure:
     """The singular values of the newest matrix over frequency, each with the bound that covers it with 95 %."""
-    look, f = style(dark), responses.frequency_hz
-    with drawing(look):
-        from livebode.pictures.scales import frequency_axis
-
-        figure, bounds = new_figure(9.0, 4.8), tr("bounds: {percent:g} %", percent=100 * COVERAGE)
-        heading(
-            figure,
-            look,
-            title or tr("Singular values"),
-            f"{bounds} · {_facts(responses)}",
-            0.085,
-        )
-        axes = figure.add_axes((0.085, 0.115, 0.79, 0.72))
-        values, radius = responses.singular_values[-1], responses.singular_value_bound()[-1]
-        ends = [bound_db(value, around) for value, around in zip(values.T.astype(complex), radius.T)]
-        for n, (value, (low, high)) in enumerate(zip(values.T, ends)):
-            _singular_value(axes, look, f, n, value, low, high)
-        _limits(axes, decibels(values), np.array(ends))
-        plain(axes)
-        frequency_axis(axes, f, labels=True)
-        _shade(axes, look, responses, ~responses.valid[-1].all(axis=1))
-        axes.set_xlabel(tr("frequency in Hz"))
-        axes.set_ylabel(_singular_label(responses))
-        if np.isfinite(values).any():
-            axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0)
-        else:
-            axes.set_yticks([])
-            _note(axes, look, tr("no line where all columns are valid"))
-    return figure
-
-
-def _panels(figure: Figure, down: int, across: int) -> NDArray[np.object_]:
-    """Axes of shape (2 · down, across), each magnitude close to its phase."""
-    width, height = figure.get_size_inches()
-    outer = figure.add_gridspec(
-        down, across, left=_LEFT_IN / width, right=1 - _RIGHT_IN / width, top=1 - _TOP_IN / height,
-        bottom=_BOTTOM_IN / height, hspace=0.2, wspace=0.08,
-    )  # fmt: skip
-    panels = np.empty((2 * down, across), dtype=object)
-    for o in range(down):
-        for i in range(across):
-            inner = outer[o, i].subgridspec(2, 1, height_ratios=[3, 2], hspace=0.08)
-            for part in range(2):
-                first = panels[2 * o + part, 0]
-                panels[2 * o + part, i] = figure.add_subplot(inner[part], sharex=panels[0, 0], sharey=first)
-                panels[2 * o + part, i].tick_params(labelleft=i == 0)
-    return panels
-
-
-def _entry(pair: Sequence[Axes], look: Style, responses: MatrixResponses, place: tuple[int, int]) -> None:
-    """Title of one Bode plot, its invalid lines, and the reason if all are."""
-    o, i = place
-    magnitude, phase = pair
-    units = responses.units[o] if responses.units else ()
-    unit = f", re 1 {units[i]}" if len(set(units)) > 1 and units[i] else ""  # a symbol in every language
-    magnitude.set_title(shortened(f"{responses.inputs[i]} → {responses.outputs[o]}{unit}", 44), fontsize="medium")
-    invalid = ~responses.valid[-1, :, i]
-    for axes in pair:
-        _shade(axes, look, responses, invalid)
-    if invalid.all():
-        words = sorted({worded(REASONS[number]) for number in responses.reason[-1, :, i]})
-        _note(magnitude, look, tr("not valid: {why}", why=", ".join(words)))
-    if i:
-        phase.set_ylabel("")
-
-
-def _label(axes: Axes, units: tuple[str, ...]) -> None:
-    """The label of the magnitudes of one output, with their unit if they have one in common."""
-    common = units[0] if len(set(units)) == 1 else ""
-    label = tr("magnitude in dB") + (f"\nre 1 {shortened(common, 26)}" if common else "")
-    axes.set_ylabel(label)
-
-
-def _singular_value(axes: Axes, look: Style, f: Floats, n: int, value: Floats, low: Floats, high: Floats) -> None:
-    """One singular value and the ends of its bound in dB."""
-    colour, db = look.traces[n % len(look.traces)], decibels(value)
-    mark: dict[str, Any] = {"marker": "o", "markersize": 3.5} if len(f) <= FEW_LINES else {}
-    (line,) = axes.plot(f, db, color=colour, linewidth=1.2, label=f"σ{n + 1}", **mark)
-    line.set_dashes(_DASHES[n % len(_DASHES)])
-    single = alone(value)
-    axes.plot(f[single], db[single], "o", color=colour, markersize=3)
-    bound(axes, f, low, high, colour)
-
-
-def _limits(axes: Axes, db: Floats, ends: Floats) -> None:
-    """Limits that contain the values, and bounds as far as these leave room for the values."""
-    drawn, ends = db[np.isfinite(db)], ends[np.isfinite(ends)]
-    if not drawn.size:
-        return
-    low, high = drawn.min(), drawn.max()
-    reach = max(0.35 * (high - low), 3.0)
-    low = max(ends.min(initial=low), low - reach)
-    high = min(ends.max(initial=high), high + reach)
-    margin = max(0.04 * (high - low), 1.0)
-    axes.set_ylim(low - margin, high + margin)
+    f = responses.frequency_hz
+    values, radius = responses.singular_values[-1], responses.singular_value_bound()[-1]
+    curves = [(decibels(v), *bound_db(v.astype(complex), r)) for v, r in zip(values.T, radius.T)]
+    y = _row_scale(curves, _singular_label(responses))
+    marks: list[Mark] = [_shade(responses, ~responses.valid[-1].all(axis=1))]
+    ends = []
+    for n, (value, low, high) in enumerate(curves):
+        colour = LIGHT.traces[n % len(LIGHT.traces)]
+        marks += _curve(f, value, low, high, colour, _DASHES[n % len(_DASHES)])
+        if (known := value[np.isfinite(value)]).size:
+            ends.append(End(f"σ{n + 1}", float(known[-1]), colour))
+    if not ends:
+        marks.append(Note(tr("no line where all columns are valid")))
+    left = room(y)
+    (panel,), height = stacked(frequency_scale(f), [(y, marks, 260.0)], left=left, width=545.0 - left)
+    panel = Panel(panel.left, panel.top, panel.width, panel.height, panel.x, y, marks, ends)
+    bounds = tr("bounds: {percent:g} %", percent=100 * COVERAGE)
+    return Figure(title or tr("Singular values"), (bounds, *_facts(responses)), (), [panel], height)
 
 
 def _singular_label(responses: MatrixResponses) -> str:
@@ -189,42 +183,12 @@ def _singular_label(responses: MatrixResponses) -> str:
     return tr("singular value in dB re 1 {unit}", unit=shortened(units.pop(), 40))
 
 
-def _shade(axes: Axes, look: Style, responses: MatrixResponses, invalid: NDArray[np.bool_]) -> None:
-    """Shade each invalid line, halfway to its neighbours on the logarithmic scale."""
-    f = responses.frequency_hz
-    between = np.sqrt(f[1:] * f[:-1]) if f.size > 1 else f * 1.1
-    low = np.concatenate([f[:1] ** 2 / between[:1], between])
-    high = np.concatenate([between, f[-1:] ** 2 / between[-1:]])
-    for k in np.flatnonzero(invalid):
-        axes.axvspan(low[k], high[k], color=look.nothing, alpha=0.6, linewidth=0, zorder=0.5, gid="invalid")
+def _shade(responses: MatrixResponses, invalid: NDArray[np.bool_]) -> Shade:
+    """Each invalid line, halfway to its neighbours on the logarithmic scale."""
+    edges = frequency_edges(responses.frequency_hz)
+    return Shade("invalid", edges[:-1][invalid], edges[1:][invalid], LIGHT.nothing)
 
 
-def _note(axes: Axes, look: Style, text: str) -> None:
-    axes.text(0.5, 0.5, text, transform=axes.transAxes, ha="center", va="center", size=10, color=look.muted)
-
-
-def _facts(responses: MatrixResponses) -> str:
+def _facts(responses: MatrixResponses) -> Sequence[str]:
     size = tr("{outputs} outputs × {inputs} inputs", outputs=len(responses.outputs), inputs=len(responses.inputs))
-    newest = tr("newest matrix, at {time}", time=moment(responses.time_s[-1], 2))
-    return f"{newest} · {size} · {lines_phrase(responses)}"
-
-
-def _key(figure: Figure, look: Style, left: float, invalid: bool) -> None:
-    from matplotlib.lines import Line2D
-    from matplotlib.patches import Patch
-
-    handles: list[Line2D | Patch] = [Line2D([], [], color=look.newest, linewidth=1.6)]
-    texts = [
-        tr(
-            "response; {percent:g} % bounds of each entry alone, as bars where larger than the marker",
-            percent=100 * COVERAGE,
-        )
-    ]
-    if invalid:
-        handles.append(Patch(facecolor=look.nothing, alpha=0.6))
-        texts.append(tr("not valid"))
-    place = (left, 1 - 0.74 / figure.get_size_inches()[1])
-    figure.legend(
-        handles, texts, loc="upper left", bbox_to_anchor=place, ncols=2, borderpad=0.0, borderaxespad=0.0,
-        handlelength=1.6,
-    )  # fmt: skip
+    return tr("newest matrix, at {time}", time=moment(responses.time_s[-1], 2)), size, lines_phrase(responses)

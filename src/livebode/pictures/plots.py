@@ -10,11 +10,11 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Floats
 from livebode.core import PlotKind, Response, Responses, UsageError, decibels, needing
 from livebode.pictures.curves import FLOOR_DB, Cloud, Curve, bound_db, bound_deg, circular, near, quantiles
+from livebode.pictures.figure import FEW_LINES, alone
 from livebode.pictures.ticks import frequency_label
 
 if TYPE_CHECKING:
@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 
     from livebode.core import MatrixResponses
 
-FEW_LINES = 40
-"""Up to this many lines each has a marker and an error bar; more are drawn as a band."""
 _CLOUD_ALPHA = 0.18
 _CLOUD_MAX = 200  # responses
 _CORNERS = 72
@@ -146,15 +144,6 @@ def bound(axes: Axes, f: Floats, low: Floats, high: Floats, colour: Any, alpha: 
         return
     known = np.isfinite(low) & np.isfinite(high)
     axes.vlines(f[known], low[known], high[known], color=colour, linewidth=1.6, zorder=4, **more)
-
-
-def alone(values: Floats) -> NDArray[np.bool_]:
-    """Known values without a known neighbour: a line plot would not show them."""
-    known = np.isfinite(values)
-    beside = np.zeros_like(known)
-    beside[1:] |= known[:-1]
-    beside[:-1] |= known[1:]
-    return known & ~beside
 
 
 def _circles(value: Complex, radius: Floats) -> list[Floats]:

@@ -1,42 +1,16 @@
-"""Scales of a Bode plot: logarithmic frequency with plain numbers, decibels, quarter turns."""
+"""Scales of a Bode plot on axes of Matplotlib: logarithmic frequency with plain numbers, quarter turns."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-from matplotlib import rcParams
-from matplotlib.markers import TICKDOWN
-from matplotlib.ticker import FixedFormatter, FixedLocator, FuncFormatter, Locator, NullFormatter, NullLocator
+from matplotlib.ticker import FuncFormatter, Locator, NullFormatter
 
-from livebode.arrays import Floats
 from livebode.pictures import ticks
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.axis import Axis
-
-
-def frequency_axis(axes: Axes, frequency_hz: Floats, labels: bool) -> None:
-    """Logarithmic frequency around these lines, with plain numbers, at the lines themselves where there is room."""
-    low_hz, high_hz = ticks.frequency_limits(frequency_hz)
-    axes.set_xscale("log")
-    axes.set_xlim(low_hz, high_hz)
-    major = ticks.line_ticks(frequency_hz, low_hz, high_hz)
-    axes.xaxis.set_major_locator(FixedLocator(major))
-    axes.xaxis.set_major_formatter(FixedFormatter([ticks.frequency_label(f) for f in major]))
-    axes.xaxis.set_minor_locator(NullLocator())
-    axes.tick_params(axis="x", labelbottom=labels)
-    _short_ticks(axes, ticks.minor_frequency_ticks(low_hz, high_hz))
-
-
-def _short_ticks(axes: Axes, places: list[float]) -> None:
-    """Minor ticks at these places: as markers of one line, which look the same and take less time."""
-    axes.plot(
-        places, np.zeros(len(places)), linestyle="", marker=TICKDOWN, markersize=rcParams["xtick.minor.size"],
-        markeredgewidth=rcParams["xtick.minor.width"], color=rcParams["xtick.color"], zorder=2.01, clip_on=False,
-        transform=axes.get_xaxis_transform(),
-    )  # fmt: skip
 
 
 def free_frequency_axis(axes: Axes) -> None:

@@ -85,7 +85,7 @@ def _picture(summary: Summary, width: int, height: int, colour: bool, unicode: b
         (phase_deg, "phase in degrees", height - upper - 4, ranges[1], dict(zip(ticks_at[1], labels[1]))),
     ):
         canvas = Canvas.blank(rows, columns)
-        level = Scale(limits[1], limits[0], rows)
+        level = CellScale(limits[1], limits[0], rows)
         _curve(canvas, frequency, level, summary.responses.lines.frequency_hz, values)
         marked = {level.cell(tick): label for tick, label in marks.items()}
         lines.append(written(title, width, unicode).center(width).rstrip())
@@ -96,12 +96,12 @@ def _picture(summary: Summary, width: int, height: int, colour: bool, unicode: b
     return "\n".join([*lines, "frequency in Hz".center(width).rstrip()])
 
 
-def _frequency_scale(summary: Summary, columns: int) -> Scale:
+def _frequency_scale(summary: Summary, columns: int) -> CellScale:
     low_hz, high_hz = ticks.frequency_limits(summary.responses.lines.frequency_hz)
-    return Scale(float(np.log10(low_hz)), float(np.log10(high_hz)), columns)
+    return CellScale(float(np.log10(low_hz)), float(np.log10(high_hz)), columns)
 
 
-def _frequency_axis(summary: Summary, scale: Scale, margin: int) -> list[str]:
+def _frequency_axis(summary: Summary, scale: CellScale, margin: int) -> list[str]:
     """The lower edge of a panel with ticks at round frequencies, and their numbers as far as there is room."""
     edge, numbers = ["─"] * scale.cells, ""
     low_hz, high_hz = ticks.frequency_limits(summary.responses.lines.frequency_hz)
@@ -115,7 +115,7 @@ def _frequency_axis(summary: Summary, scale: Scale, margin: int) -> list[str]:
     return [" " * margin + f"└{''.join(edge)}┘", " " * (margin + 1) + numbers]
 
 
-def _curve(canvas: Canvas, frequency: Scale, level: Scale, frequency_hz: Floats, values: Floats) -> None:
+def _curve(canvas: Canvas, frequency: CellScale, level: CellScale, frequency_hz: Floats, values: Floats) -> None:
     """Draw the curve, interrupted at lines without a value, and a circle at each line if they are few."""
     known = np.isfinite(values)
     across = frequency.dot(np.log10(frequency_hz), 2)
@@ -137,7 +137,7 @@ def _range(values: Floats, least: float) -> tuple[float, float]:
 
 
 @dataclass(frozen=True)
-class Scale:
+class CellScale:
     """Linear from the first to the last of so many cells; `begin` may be larger than `end`."""
 
     begin: float

@@ -49,14 +49,14 @@ def lines_phrase(responses: Responses | MatrixResponses) -> str:
     return tr("{count} lines, {low}–{high} Hz", count=len(f), low=low, high=high)
 
 
-def facts(responses: Responses, valid_rows: int, names: tuple[str, str] | None = None) -> str:
-    """The line below the title: quantity, channels, lines, and how much is valid."""
+def facts(responses: Responses, valid_rows: int, names: tuple[str, str] | None = None) -> list[str]:
+    """What is below the title: quantity and channels, lines, and how much is valid."""
     description = quantity(responses)
     if names:
         first, second = (shortened(name, 30) for name in names)
         description = tr("{quantity} from {input} to {output}", quantity=description, input=first, output=second)
     valid = trn("{valid} of {n} response valid", "{valid} of {n} responses valid", len(responses), valid=valid_rows)
-    return f"{description} · {lines_phrase(responses)} · {valid}"
+    return [description, lines_phrase(responses), valid]
 
 
 def labelled(name: str, unit: str) -> str:

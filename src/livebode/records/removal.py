@@ -13,7 +13,7 @@ from livebode.records.summary_file import COPY, RUN, is_run, read_summary
 
 _SHOWN = 5
 _PARTIAL = r"\.partial(-[0-9a-f]{8})?"  # of livebode.core.files
-_DRAWN = r"(bode|tracking|modes|margins|validation|singular-values|tune|friction|orders)\.png"
+_DRAWN = r"(bode|tracking|modes|margins|validation|singular-values|tune|friction|orders)\.svg"
 _PROPOSED = r"gains\.(toml|csv)|filters\.(h|st)|odrive\.txt|shaper\.(h|st|cfg)"
 _REPLACED = rf"(run|run-copy|references|notes|loop-check|tune)\.json|report\.(html|pdf)|{_DRAWN}|{_PROPOSED}"
 _FILES = re.compile(
@@ -21,7 +21,7 @@ _FILES = re.compile(
 )
 _SEGMENT = re.compile(r"\d{6,9}(-\d{6,9})?\.parquet|\.\d{6,9}(-\d{6,9})?\.parquet\.partial")
 _JOURNAL = re.compile(r"\d{6,9}\.journal|\.\d{6,9}\.journal\.partial")
-_PICTURE = re.compile(rf"[a-z-]+\.png|\.[a-z-]+\.png{_PARTIAL}")
+_PICTURE = re.compile(rf"[a-z-]+\.svg|\.[a-z-]+\.svg{_PARTIAL}")
 _FOLDERS = {
     "responses": _SEGMENT, "covariance": _SEGMENT, "parameters": _SEGMENT, "samples": _SEGMENT,
     "responses_1s": _SEGMENT, "responses_1min": _SEGMENT, "responses_1h": _SEGMENT,

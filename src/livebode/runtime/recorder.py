@@ -155,10 +155,6 @@ Draw = Callable[[Any, Path], None]
 """Draws an estimate (`Estimate`, which cannot be named here without a circle) into a directory."""
 
 
-def nothing() -> None:
-    """No preparation."""
-
-
 @dataclass(frozen=True)
 class Destination:
     """Directory and subscribers of a run.
@@ -176,8 +172,6 @@ class Destination:
         Each receives every document that the run publishes.
     record
         Record of a recording's run in place of a run directory. `draw` and `force` then have no effect.
-    prepare
-        Called once when a recording has been opened: loads, beside the run, what `draw` needs.
     findings
         Called at the end of the run: entries of run.json about its subscribers.
     """
@@ -187,7 +181,6 @@ class Destination:
     force: bool = False
     subscribers: tuple[Subscriber, ...] = ()
     record: Recorder | None = None
-    prepare: Callable[[], None] = nothing
     findings: Callable[[], Mapping[str, Any]] = dict
 
     def announce(self, document: Document) -> None:

@@ -55,7 +55,6 @@ def examined_recording(axis: Axis, log: Log, follower: Follower, to: Destination
     log = log.naming(axis.signals.named)
     estimate = SingleResponse.of(axis, follower, log.channels)
     log = log.naming(estimate.channels)  # with the covariates of a baseline
-    to.prepare()
     to.announce(RunStep("examining"))
     of, settings = examined(axis, log, follower), follower.settings
     if settings.quantity == "plant" and settings.periodic:

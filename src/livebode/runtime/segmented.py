@@ -286,7 +286,7 @@ class SegmentedRecord:
 
     def finish(self, summary: dict[str, Any], draw: Callable[[Path], None]) -> None:
         """Draw the pictures, close open files and write run.json."""
-        check_folder(self.path, f".{_PICTURES}.partial/bode.png")
+        check_folder(self.path, f".{_PICTURES}.partial/bode.svg")
         with writing(self.path, RecordError, unchanged=False):
             remove_folder(self.path, f".{_PICTURES}.partial")  # the remainder of a kill
             with whole_files(self.path, _PICTURES, locked=True) as folder:

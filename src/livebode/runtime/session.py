@@ -16,7 +16,7 @@ from livebode.language import Message
 from livebode.runtime.allocation import FreeMemory, share_between_threads
 from livebode.runtime.axis_thread import AxisThread
 from livebode.runtime.change import ChangeRequest, change_of
-from livebode.runtime.recorder import Destination, nothing
+from livebode.runtime.recorder import Destination
 from livebode.runtime.service_manager import ServiceManager
 from livebode.runtime.status import Status
 
@@ -43,7 +43,7 @@ _logger = logging.getLogger(__name__)
 
 def nothing_to_apply(_: Axes) -> Callable[[], None]:
     """Nothing belongs to the whole session."""
-    return nothing
+    return lambda: None
 
 
 class Session:

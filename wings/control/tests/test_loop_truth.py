@@ -35,14 +35,14 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_margins_of_a_run_hold_the_true_ones(run: Path) -> None:
-    done = livebode("margins", run, "--json", pictures=True)
+    done = livebode("margins", run, "--json")
     assert done.code == 0, done.err
     found, true = json.loads(done.out)["margins"], read(Case(BELT))
     for i, name in enumerate(true.names):
         one = found[name]
         assert abs(one["value"] - true.value[0, i]) < 2 * one["bound_95"] + 1e-9, name
         assert one["place"] == true.place[0, i] or abs(one["frequency_hz"] - 20) < 1, name
-    assert (run / "margins.png").stat().st_size > 20_000
+    assert (run / "margins.svg").stat().st_size > 3_000
     assert json.loads(done.out)["tuning"]["verdict"] == "none needed"
 
 
@@ -50,7 +50,7 @@ def test_a_loop_that_is_described_beside_the_run_is_judged_and_tuned(run: Path) 
     """As if the same machine ran under a sharper controller: the description alone changes the loop."""
     sharp = run.parent / "sharp.toml"
     sharp.write_text(AXIS.format(gain=4 * 0.2308, delay=8), encoding="utf-8")
-    done = livebode("margins", run, "--axis", sharp, pictures=True)
+    done = livebode("margins", run, "--axis", sharp)
     assert done.code == 0, done.err
     assert "suggested: Ms is up to" in done.out
     assert "notch at 59" in done.out
@@ -79,10 +79,7 @@ def test_a_run_with_a_delay_gets_margins_with_it_and_none_where_it_is_held_at_ze
     assert held["margins"]["gain_margin"]["value"] is None
     assert held["tuning"]["verdict"] == "refused"
     assert "free a parameter" in held["message"]
-    assert (
-        "no margins: the two-mass model contradicts the lines"
-        in livebode("margins", folder / "held", pictures=True).out
-    )
+    assert "no margins: the two-mass model contradicts the lines" in livebode("margins", folder / "held").out
 
 
 def delayed(ticks: float) -> np.ndarray:
@@ -109,13 +106,13 @@ def test_the_run_itself_holds_its_margins(run: Path) -> None:
 
 def test_a_true_model_passes_on_fresh_data_and_a_wrong_one_does_not(run: Path) -> None:
     fresh = run.parent / "fresh.parquet"
-    done = livebode("validate", run, "--on", fresh, "--samples", 3000, "--json", pictures=True)
+    done = livebode("validate", run, "--on", fresh, "--samples", 3000, "--json")
     assert done.code == 0, done.err
     one = json.loads(done.out)["models"][0]
     assert one["verdict"] == "passes"
     assert one["samples"] == 3000
     assert {c["with"] for c in one["correlations"]} == {"u", "ŷ", "w"}
-    assert (run / "validation.png").stat().st_size > 20_000
+    assert (run / "validation.svg").stat().st_size > 3_000
     done = livebode("validate", run, "--on", fresh, "--model", "two-mass", "--model", "rigid")
     assert "two-mass passes" in done.out
     assert "rigid was not fitted" in done.out

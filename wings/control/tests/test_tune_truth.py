@@ -46,14 +46,14 @@ def test_a_run_is_tuned_once_its_loop_was_checked(run: Path) -> None:
     assert refused.code == 2
     assert "livebode validate --loop" in refused.err
     assert livebode("validate", run, "--loop").out.startswith("loop checked: as described")
-    done = livebode("tune", run, pictures=True)
+    done = livebode("tune", run)
     assert done.code == 0, done.err
     assert "velocity.gain" in done.out
     assert "is promised" in done.out
     inertia, bound = map(float, re.search(r"inertia +(\S+) ± (\S+)", done.out).groups())  # type: ignore[union-attr]
     assert abs(inertia - (0.0028 + 6.7 * 0.019**2)) < bound < 0.1 * inertia
     assert "--strokes" in done.out  # the axis was at standstill
-    assert (run / "tune.png").stat().st_size > 20_000
+    assert (run / "tune.svg").stat().st_size > 3_000
     assert "LIVEBODE_FILTERS" in (run / "filters.h").read_text(encoding="utf-8")
     velocity = tomllib.loads((run / "gains.toml").read_text(encoding="utf-8"))["loop"]["velocity"]
     assert f"{velocity['gain']:.5g}" in done.out
@@ -253,7 +253,7 @@ def test_gains_over_the_schedule_are_proposed_from_stops_at_places(tmp_path: Pat
     words = words.replace('output = "y"', 'output = "velocity"\nschedule = "x"')
     (tmp_path / "axis.toml").write_text(words, encoding="utf-8")
     assert livebode("run", tmp_path / "axis.toml", "--out", tmp_path / "run").code == 0
-    done = livebode("tune", tmp_path / "run", "--loop-checked", "--schedule", pictures=True)
+    done = livebode("tune", tmp_path / "run", "--loop-checked", "--schedule")
     assert done.code == 0, done.err
     assert "gains over the schedule" in done.out
     rows = (tmp_path / "run" / "gains.csv").read_text(encoding="utf-8").splitlines()

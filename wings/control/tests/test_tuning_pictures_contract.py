@@ -10,10 +10,12 @@ import pytest
 from livebode.core import PID, Lines, Loop, Responses
 from livebode.fitting import EvaluationGrid, TwoMass
 from livebode.motion import FrictionCurve
+from livebode.pictures import Trace, svg_file
 from livebode_control.proposal.tuning_picture import tuning_figure
 from livebode_control.tuning import ControllerProposal, LoopSpecification, tune
 from livebode_control.tuning.feedforward import Feedforward
 from livebode_control.tuning.gain_schedule import GainSchedule, gain_schedule
+from tests.support.drawn_svg import checked
 
 RATE_HZ = 4000.0
 LOOP = Loop(PID(gain=0.2, integral_time_s=0.2, rate_hz=RATE_HZ, delay_ticks=4))
@@ -52,28 +54,26 @@ def forward() -> Feedforward:
     return Feedforward(0.005, 1e-4, 0.01, 1e-3, 0.1, 1e-2, 0.02, 1e-2, curve)
 
 
-@pytest.mark.parametrize("dark", [False, True])
-def test_the_lower_row_has_what_was_asked_for(
-    found: ControllerProposal, gains: GainSchedule, forward: Feedforward, dark: bool
-) -> None:
-    figure = tuning_figure(found, gains=gains, feedforward=forward, dark=dark)
-    noise, scheduled, bandwidths, friction = figure.axes[-4:]
-    before, limit = noise.lines[1].get_ydata()[-1], noise.lines[2].get_ydata()[0]
-    assert (before, noise.lines[0].get_ydata()[-1]) == pytest.approx(found.noise)
-    assert limit == SPECIFICATION.input_noise
-    for line, column in zip(scheduled.lines, gains.logarithms.T):
-        first = np.log(gains.common.feedback.controller.gain)
-        assert np.asarray(line.get_xdata()).tolist() == [0, 1, 2]
-        if line.get_label() == "gain":
-            np.testing.assert_allclose(line.get_ydata(), np.exp(column - first))
-    for line, promised in zip(bandwidths.lines, (gains.common_promised, gains.promised)):
-        assert list(line.get_ydata()) == [one.bandwidth_hz for one in promised]
-    assert "0.005" in friction.get_title()
+def test_below_is_what_was_asked_for(found: ControllerProposal, gains: GainSchedule, forward: Feedforward) -> None:
+    figure = tuning_figure(found, gains=gains, feedforward=forward)
+    checked(svg_file(figure))
+    noise, scheduled, bandwidths, friction = (
+        {mark.name: mark for mark in panel.marks if isinstance(mark, Trace)} for panel in figure.panels[-4:]
+    )
+    assert (noise["before"].y[-1], noise["proposed"].y[-1]) == pytest.approx(found.noise)
+    assert noise["limit"].y[0] == SPECIFICATION.input_noise
+    for name, column in zip(gains.names, (gains.logarithms - gains.common_logarithms).T):
+        assert scheduled[name].x.tolist() == [0, 1, 2]
+        np.testing.assert_allclose(scheduled[name].y, np.exp(column))
+    for name, promised in (("before", gains.common_promised), ("proposed", gains.promised)):
+        assert list(bandwidths[name].y) == [one.bandwidth_hz for one in promised]
+    assert "0.005" in figure.panels[-1].title
+    assert "friction" in friction
 
 
 def test_nothing_is_added_without_being_asked_for(responses: Responses) -> None:
     plain = tune(responses, LOOP, loop_checked=True)
-    assert len(tuning_figure(plain, feedforward=Feedforward(0.005, 1e-4)).axes) == 6
+    assert len(tuning_figure(plain, feedforward=Feedforward(0.005, 1e-4)).panels) == 6
 
 
 def test_friction_and_its_bound_are_those_of_the_curve(forward: Feedforward) -> None:

@@ -14,11 +14,13 @@ from scipy.io import loadmat
 from livebode import Lines, open_log
 from livebode.core import DesignError, LivebodeError
 from livebode.excitation import Waveform, multisine
+from livebode.pictures import svg_file
 from livebode.records import RunRecord
 from livebode.simulation import SimulatedAxis
 from livebode_design import Experiment, choose, write
-from livebode_design.excitation_picture import save_excitation_picture
+from livebode_design.excitation_picture import excitation_figure
 from tests.support.command import livebode, write_parquet
+from tests.support.drawn_svg import checked
 from tests.support.schemas import validator
 from tools.structured_text import Machine
 
@@ -239,23 +241,25 @@ def test_the_seed_in_a_file_makes_the_same_file_again(tmp_path):
 
 
 def test_the_table_gives_each_choice_with_its_reason(tmp_path):
-    shown = livebode(
-        "design", ROOT / "examples" / "experiment.toml", "--out", tmp_path / "d", "--to", "csv", pictures=True
-    )
+    shown = livebode("design", ROOT / "examples" / "experiment.toml", "--out", tmp_path / "d", "--to", "csv")
     assert shown.code == 0, shown.err
     for word in ("lines", "window", "amplitude", "peak torque", "following error", "95 % bound", "recording", "hop"):
         assert word in shown.out
     assert sorted(p.name for p in (tmp_path / "d").iterdir()) == [
-        "axis.schema.json", "axis.toml", "design.json", "excitation.csv", "excitation.png",
+        "axis.schema.json", "axis.toml", "design.json", "excitation.csv", "excitation.svg",
     ]  # fmt: skip
     printed = json.loads((tmp_path / "d" / "design.json").read_text())
     for f, sigma in zip(printed["frequency_hz"], printed["sigma_relative"]):
         assert re.search(rf"^ *{f:g} Hz .* {100 * sigma:.3g} % of \|G\|", shown.out, re.MULTILINE), f
 
 
-def test_the_picture_is_drawn_light_and_dark_for_every_kind(tmp_path):
+def test_the_picture_has_the_samples_and_the_lines_of_every_kind(tmp_path):
     for kind in ("odd", "prbs", "stepped"):
         asked = Experiment.read(described(tmp_path, KINDS[kind]))
         design = choose(asked.spec(), asked.machine(), asked.machine_limits())
-        for dark in (False, True):
-            assert save_excitation_picture(design, tmp_path / f"{kind}{dark}.png", dark=dark).stat().st_size > 20_000
+        figure = excitation_figure(design)
+        checked(svg_file(figure))
+        (period,) = figure.marks("excitation")
+        np.testing.assert_array_equal(period.y[::2], design.waveform.samples)
+        amplitudes = np.abs(design.waveform.spectrum[list(design.waveform.lines.bins)])
+        np.testing.assert_array_equal(figure.marks("line")[-1].y, amplitudes)

@@ -72,21 +72,12 @@ def test_the_result_lists_the_entries_and_the_condition(folder: Path) -> None:
 def test_a_run_draws_its_pictures_and_is_replaced_with_them(folder: Path) -> None:
     again = ("run", folder / "before.toml", "--out", folder / "drawn", "--force")
     for _ in range(2):
-        found = livebode(*again, pictures=True)
+        found = livebode(*again)
         assert (found.code, found.err) == (0, "")
     assert sorted(path.name for path in (folder / "drawn").iterdir()) == [
-        "bode.png", "covariance.parquet", "events.jsonl", "manifest.jsonl", "responses.parquet", "run-copy.json",
-        "run.json", "singular-values.png",
+        "bode.svg", "covariance.parquet", "events.jsonl", "manifest.jsonl", "responses.parquet", "run-copy.json",
+        "run.json", "singular-values.svg",
     ]  # fmt: skip
-
-
-def test_without_matplotlib_a_run_says_how_to_get_pictures(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("livebode.cli.pictures.can_draw", lambda: False)
-    monkeypatch.setattr("livebode_matrix.terminal.can_draw", lambda: False)
-    found = livebode("run", folder / "before.toml", "--out", folder / "bare", pictures=True)
-    assert found.code == 0
-    assert found.out.count("no pictures, because Matplotlib is not installed; run ") == 1
-    assert not (folder / "bare" / "bode.png").exists()
 
 
 def test_repeated_options_make_a_matrix(folder: Path) -> None:

@@ -42,7 +42,7 @@ def run(log: Path) -> tuple[Path, str]:
 def test_the_run_has_modes_and_harmonics_with_bounds_and_no_responses(run: tuple[Path, str]) -> None:
     out, _ = run
     assert {path.name for path in out.iterdir()} == {
-        "run.json", "run-copy.json", "manifest.jsonl", "events.jsonl", "parameters.parquet", "modes.png",
+        "run.json", "run-copy.json", "manifest.jsonl", "events.jsonl", "parameters.parquet", "modes.svg",
     }  # fmt: skip
     summary = json.loads((out / "run.json").read_text("utf-8"))
     assert summary["output_only"] is True

@@ -30,9 +30,8 @@ def parts(document: Document, kind: type, title: str) -> list:
 def curve(picture: Picture | None, name: str) -> np.ndarray:
     """Frequency and magnitude of a curve of the picture."""
     assert picture is not None
-    magnitude = drawn(picture).axes[0]
-    (line,) = (artist for artist in magnitude.get_children() if artist.get_gid() == name)
-    return np.asarray(line.get_xydata())
+    line = next(mark for mark in drawn(picture).panels[0].marks if getattr(mark, "name", "") == name)
+    return np.column_stack([line.x, line.y])
 
 
 def recorded(folder: Path, name: str) -> Path:

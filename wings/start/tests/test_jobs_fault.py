@@ -147,7 +147,7 @@ def test_a_job_ends_in_order_when_its_server_is_killed(tmp_path: Path) -> None:
         server.kill()
         server.wait()
     until(lambda: not runs(job), "the end of the job", 60)
-    assert (tmp_path / "live" / "bode.png").exists()  # the last thing that a run writes
+    assert (tmp_path / "live" / "bode.svg").exists()  # the last thing that a run writes
 
 
 def test_a_file_among_the_recordings_is_not_run_as_a_module(jobs: Jobs, tmp_path: Path) -> None:

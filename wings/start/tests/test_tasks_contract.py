@@ -174,7 +174,7 @@ def test_a_design_is_that_of_the_terminal_with_its_reasons_and_downloads(tab: Ta
         "[belt.sensor]\nnoise_rad_per_s = 0.1\n[limits]\ntorque_n_m_max = 14.5\n"
         "[excitation]\nband_hz = [20, 140]\nresolution_hz = 10\n"
     )
-    done = livebode("design", experiment, "--out", folder.parent / "design", pictures=True)
+    done = livebode("design", experiment, "--out", folder.parent / "design")
     assert done.code == 0, done.err
     names = {path.name for path in (folder / "designs/excitation").iterdir()}
     assert {"excitation.csv", "excitation.wav", "excitation.h", "excitation.st"} < names

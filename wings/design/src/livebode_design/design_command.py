@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from livebode.cli import Json, NextCommand, can_draw, console, parsed_band, tell_how_to_draw
+from livebode.cli import Json, NextCommand, console, parsed_band
 from livebode.core import UsageError
 
 
@@ -53,9 +53,8 @@ def design_command(
     asked = described(experiment, {key: value for key, value in given.items() if value is not None})
     if not isinstance(asked, Experiment):
         _refuse_for_several(band=band, resolution=resolution, amplitude=amplitude)
-    draw = loaded(asked.picture) if can_draw() else None
     with working():
-        made = design_experiment(asked, out, name=name, suffixes=to, force=force, draw=draw)
+        made = design_experiment(asked, out, name=name, suffixes=to, force=force, draw=loaded(asked.picture))
     if as_json:
         print(to_json({"directory": str(made.directory), "files": list(made.files)} | made.design.plain()))
         return None
@@ -63,7 +62,6 @@ def design_command(
     if made.left_out:
         print(made.left_out)
     print(f"{made.directory}/: {', '.join(made.files)}")
-    tell_how_to_draw()
     if isinstance(asked, Experiment) and asked.source is not None:
         return NextCommand("measure", experiment, "--dry-run")
     if isinstance(asked, Experiment) and asked.belt is not None:

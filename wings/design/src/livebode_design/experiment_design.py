@@ -141,7 +141,7 @@ def design_experiment(
         (partial / _AXIS).write_text(f"#:schema ./{_SCHEMA}\n{experiment.axis_text(design)}", encoding="utf-8")
         (partial / _SCHEMA).write_text(_schema_text(), encoding="utf-8")
         if draw is not None:
-            draw(design, partial / f"{name}.png")
+            draw(design, partial / f"{name}.svg")
         files = tuple(sorted([*(path.name for path in partial.iterdir()), _MARK]))
         facts = {"files": files} | design.plain()
         (partial / _MARK).write_text(to_json(facts, indent=1) + "\n", encoding="utf-8")
@@ -205,7 +205,7 @@ def _check_names(name: str, log: str) -> None:
             key="log",
             value=log,
         )
-    if log in (_MARK, _AXIS, _SCHEMA, f"{name}.png", *(f"{name}{kind}" for kind in FORMATS)):
+    if log in (_MARK, _AXIS, _SCHEMA, f"{name}.svg", *(f"{name}{kind}" for kind in FORMATS)):
         raise ConfigError(
             "key-conflict",
             f"log = {log!r} is a file of the design",
@@ -264,5 +264,5 @@ def _left_by(directory: Path) -> set[str]:
         return set()
     excitations = names - {_MARK, _AXIS, _SCHEMA}
     single = len({Path(name).stem for name in excitations}) == 1
-    plain = all(Path(name).suffix in (*FORMATS, ".png") and Path(name).name == name for name in excitations)
+    plain = all(Path(name).suffix in (*FORMATS, ".svg") and Path(name).name == name for name in excitations)
     return names if single and plain and len(names - excitations) == 3 else set()

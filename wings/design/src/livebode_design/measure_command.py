@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from livebode.cli import Json, NextCommand, can_draw, console
+from livebode.cli import Json, NextCommand, console
 
 if TYPE_CHECKING:
     from livebode_design.experiment import Experiment
@@ -77,7 +77,7 @@ def _measure(asked: Experiment, prepared: ReadyMeasurement, out: Path, as_json: 
         print(f"livebode: {sentence}", flush=True, file=sys.stderr if as_json else sys.stdout)
 
     with _stopping() as (request, signals):
-        made = measure(asked, prepared, out, request, say=say, draw=loaded(asked.picture) if can_draw() else None)
+        made = measure(asked, prepared, out, request, say=say, draw=loaded(asked.picture))
     say(f"{made.samples} samples in {out / made.log}, {made.lost} of them lost")
     if signals:
         say("the measurement was stopped, and not tracked")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from livebode.cli import can_draw, one_drawing_at_a_time, show_monitoring, tell_how_to_draw, tracked_amount
+from livebode.cli import show_monitoring, tracked_amount
 from livebode.core import MatrixResponses
 from livebode.locations import original
 from livebode.runtime import Outcome
@@ -15,14 +15,13 @@ if TYPE_CHECKING:
 
 
 def draw_matrix(estimate: ResponseMatrix, into: Path) -> None:
-    """Draw bode.png and singular-values.png of a matrix run, if Matplotlib is installed."""
+    """Draw bode.svg and singular-values.svg of a matrix run."""
     responses = estimate.drawn or estimate.newest
-    if responses is None or not can_draw():
+    if responses is None:
         return
     from livebode.pictures import save_matrix_pictures
 
-    with one_drawing_at_a_time():
-        save_matrix_pictures(responses, into, title=estimate.axis.source.title)
+    save_matrix_pictures(responses, into, title=estimate.axis.source.title)
 
 
 def show_matrix(outcome: Outcome) -> None:
@@ -40,7 +39,6 @@ def show_matrix(outcome: Outcome) -> None:
     if not newest.valid.any():
         print("if the inputs move, compare [experiments] with the recording: dwell_periods, settle_periods, start")
     show_monitoring(outcome.summary["monitoring"])
-    tell_how_to_draw()
 
 
 def matrix_lines(newest: MatrixResponses) -> list[str]:

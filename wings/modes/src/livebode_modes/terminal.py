@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from livebode.cli import can_draw, is_terminal, one_drawing_at_a_time, print_drawn, tell_how_to_draw
+from livebode.cli import is_terminal, print_drawn
 from livebode.core import INTERVAL_FACTOR, counted
 from livebode.locations import original
-from livebode.pictures import Canvas, Scale, clock, linear_ticks, written
+from livebode.pictures import Canvas, CellScale, clock, linear_ticks, written
 from livebode.runtime import Outcome
 from livebode_modes.curves import ModeCurve, mode_curves
 
@@ -55,7 +55,7 @@ def terminal_modes(
     marks = [(tick, f"{tick:g}") for tick in linear_ticks(low, high, most=max(3, height // 4))]
     margin = max(len(text) for _, text in marks)
     rows, columns = height - 5, width - margin - 2
-    level, across = Scale(high, low, rows), Scale(begin, end, columns)
+    level, across = CellScale(high, low, rows), CellScale(begin, end, columns)
     canvas = Canvas.blank(rows, columns)
     canvas.dots[level.dot(f[known], 4), across.dot(time_s, 2)] = True
     marked = {level.cell(tick): text for tick, text in marks}
@@ -75,7 +75,7 @@ def _limits(values: np.ndarray, share: float) -> tuple[float, float]:
     return low - margin * (share > 0), high + margin
 
 
-def _time_axis(across: Scale, begin: float, end: float, margin: int) -> list[str]:
+def _time_axis(across: CellScale, begin: float, end: float, margin: int) -> list[str]:
     edge, numbers = ["─"] * across.cells, ""
     for tick in linear_ticks(begin, end, most=max(3, across.cells // 12)):
         cell, text = across.cell(tick), f"{tick:g}"
@@ -87,26 +87,23 @@ def _time_axis(across: Scale, begin: float, end: float, margin: int) -> list[str
 
 
 def draw_modes(estimate: OutputOnly, into: Path) -> None:
-    """Draw modes.png into the directory of a run, if Matplotlib is installed."""
-    if not can_draw():
-        return
+    """Draw modes.svg into the directory of a run."""
     from livebode.records import RunRecord
-    from livebode_modes.picture import save_modes  # with Matplotlib half a second to import
+    from livebode_modes.picture import save_modes
 
     run, axis = RunRecord.open(into, output_only=True), estimate.axis
     assert axis is not None
     title = f"{axis.source.title}: {axis.signals.output}"
-    with one_drawing_at_a_time():
-        save_modes(mode_curves(run), into, title=title, facts=_facts(run.summary))
+    save_modes(mode_curves(run), into, title=title, facts=_facts(run.summary))
 
 
-def _facts(summary: dict[str, Any]) -> str:
+def _facts(summary: dict[str, Any]) -> list[str]:
     facts = summary["found"]
-    return (
-        f"from the output alone: {', '.join(facts['outputs'])} · {counted(len(summary['modes']), 'mode')}, "
-        f"{counted(len(summary['harmonics']), 'harmonic')} · window {facts['window'] / facts['rate_hz']:.4g} s · "
-        "95 % bounds"
-    )
+    return [
+        f"from the output alone: {', '.join(facts['outputs'])}",
+        f"{counted(len(summary['modes']), 'mode')}, {counted(len(summary['harmonics']), 'harmonic')}",
+        f"window {facts['window'] / facts['rate_hz']:.4g} s", "95 % bounds",
+    ]  # fmt: skip
 
 
 def show_modes(outcome: Outcome) -> None:
@@ -126,7 +123,6 @@ def show_modes(outcome: Outcome) -> None:
     for line in mode_lines(outcome.summary):
         print(line)
     print(f"{original(str(outcome.directory))}/")
-    tell_how_to_draw()
 
 
 def mode_lines(summary: dict[str, Any]) -> list[str]:

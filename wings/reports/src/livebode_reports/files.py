@@ -6,7 +6,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from livebode.configuration import recorded_report
-from livebode.core import Document, OutputError, UsageError, install_command
+from livebode.core import Document, ExtraError, OutputError, UsageError, install_command
 from livebode.language import in_language
 from livebode.records import read_summary
 from livebode_reports.first_page import trusted
@@ -44,8 +44,8 @@ def write_documents(document: Document, out: Path, *, force: bool) -> tuple[list
         return [page], _NO_PDF.format(install_command("pdf"))
     try:
         save(paper, lambda partial: save_pdf(document, partial, drawn), force=force)
-    except OutputError as error:
-        if error.code == "output.no-font":
+    except (ExtraError, OutputError) as error:
+        if error.code in ("extra.not-installed", "output.no-font"):
             return [page], f"no PDF: {error}"
         raise
     return [page, paper], ""

@@ -8,7 +8,7 @@ from html import escape
 from livebode.core import Answer, Document, Finding, Listing, Paragraph, Part, Picture, PrintedTable, Section
 from livebode.language import current_language, worded
 from livebode_reports.page_style import STYLE_SHEET
-from livebode_reports.svg import pictures_svg, themed_svg
+from livebode_reports.svg import pictures_svg
 
 
 def to_html(document: Document, drawn: tuple[str, ...] | None = None) -> str:
@@ -112,8 +112,7 @@ class _Page:
         return self._picture(part) if isinstance(part, Picture) else _table(part)
 
     def _picture(self, part: Picture) -> str:
-        caption = _text(part.caption)
-        return f"<figure>\n{themed_svg(self._svg[id(part)], caption)}\n<figcaption>{caption}</figcaption>\n</figure>"
+        return f"<figure>\n{self._svg[id(part)]}\n<figcaption>{_text(part.caption)}</figcaption>\n</figure>"
 
 
 def readable(text: str) -> str:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from livebode.core import Tone
-from livebode.pictures import DARK, LIGHT
-from livebode_reports.svg import variables
+from livebode.pictures import DARK, LIGHT, Style, style_rules
 
 _GREEN, _AMBER, _RED, _GREY = (
     ("#00734d", "#4cc79b"),
@@ -20,14 +19,21 @@ TONE_COLOURS = {tone: light for tone, (light, _) in _TONES.items()}
 """On white paper; each has a contrast of 4.5 or more."""
 
 
+def _colours(look: Style) -> str:
+    """The colours of the page, named after those on white paper."""
+    names = ("ink", "muted", "grid", "run", "paper")
+    return " ".join(f"--c{getattr(LIGHT, name)[1:]}: {getattr(look, name)};" for name in names)
+
+
 def _tones(dark: bool) -> str:
     return " ".join(f"--{tone}: {pair[dark]};" for tone, pair in _TONES.items())
 
 
 STYLE_SHEET = (
-    f":root {{ color-scheme: light dark; {_tones(False)} --shade: #f4f6f8; {variables(LIGHT)} }}\n"
+    f":root {{ color-scheme: light dark; {_tones(False)} --shade: #f4f6f8; {_colours(LIGHT)} }}\n"
     "@media screen and (prefers-color-scheme: dark) { :root { "
-    f"{_tones(True)} --shade: #1a222b; {variables(DARK)} }} }}\n"
+    f"{_tones(True)} --shade: #1a222b; {_colours(DARK)} }} }}\n"
+    + style_rules()
     + "".join(f".{tone} {{ color: var(--{tone}); }}\n" for tone in _TONES)
     + """
 * { box-sizing: border-box; }

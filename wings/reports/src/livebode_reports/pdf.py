@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import json
 import re
+import struct
 import tempfile
 from dataclasses import dataclass, field
 from functools import cache
 from importlib.resources import files
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -28,17 +30,13 @@ from livebode.core import (
     Picture,
     PrintedTable,
     Section,
-    needing,
+    not_installed,
 )
 from livebode.language import current_language, worded
 from livebode.pictures import LIGHT, columns
 from livebode_reports.html import readable
 from livebode_reports.page_style import TONE_COLOURS
 from livebode_reports.svg import pictures_svg
-
-with needing("Matplotlib", "plots", "a picture"):
-    import matplotlib
-    from matplotlib.ft2font import FT2Font
 
 _PLAIN, _FIXED = "DejaVu Sans", "DejaVu Sans Mono"
 _WIDE_FAMILIES = (
@@ -80,9 +78,9 @@ def letters_of(text: str) -> Letters:
     OutputError
         If the language is Chinese and this computer has no font for that.
     """
-    folder = Path(matplotlib.get_data_path()) / "fonts" / "ttf"
+    folder = _folder()
     # A heading needs the bold letter, for which the other is not used.
-    codes = _codes(str(folder / "DejaVuSans.ttf")) & _codes(str(folder / "DejaVuSans-Bold.ttf"))
+    codes = _codes(folder / "DejaVuSans.ttf") & _codes(folder / "DejaVuSans-Bold.ttf")
     if not _WIDE.search(text):
         return Letters((_PLAIN,), (_FIXED, _PLAIN), (str(folder),), codes)
     font = _wide_font()
@@ -96,11 +94,35 @@ def letters_of(text: str) -> Letters:
         return Letters((_PLAIN,), (_FIXED, _PLAIN), (str(folder),), codes)
     family, path = font
     fonts = (_PLAIN, family)
-    return Letters(fonts, (_FIXED, *fonts), (str(folder), str(Path(path).parent)), codes | _codes(path))
+    return Letters(fonts, (_FIXED, *fonts), (str(folder), str(Path(path).parent)), codes | _wide_codes(path))
+
+
+def _folder() -> Path:
+    """Where the fonts are that Matplotlib brings; to import it would take half of a report's time."""
+    found = find_spec("matplotlib")
+    if found is None or found.origin is None:
+        raise not_installed("a PDF needs the fonts of Matplotlib", package="matplotlib", extra="pdf")
+    return Path(found.origin).parent / "mpl-data" / "fonts" / "ttf"
 
 
 @cache
-def _codes(path: str) -> frozenset[int]:
+def _codes(path: Path) -> frozenset[int]:
+    """The letters of a font: its groups of codes (OpenType, "cmap" in format 12)."""
+    data = path.read_bytes()
+    tables = {data[at : at + 4]: at for at in range(12, 12 + 16 * int.from_bytes(data[4:6], "big"), 16)}
+    (table,) = struct.unpack_from(">I", data, tables[b"cmap"] + 8)
+    (count,) = struct.unpack_from(">H", data, table + 2)
+    maps = [table + struct.unpack_from(">I", data, table + 8 + 8 * i)[0] for i in range(count)]
+    groups = next(at for at in maps if data[at : at + 2] == b"\0\x0c")
+    (number,) = struct.unpack_from(">I", data, groups + 12)
+    ends = (struct.unpack_from(">II", data, groups + 16 + 12 * i) for i in range(number))
+    return frozenset(code for first, last in ends for code in range(max(first, 32), last + 1))
+
+
+@cache
+def _wide_codes(path: str) -> frozenset[int]:
+    from matplotlib.ft2font import FT2Font
+
     return frozenset(code for code in FT2Font(path).get_charmap() if code >= 32)
 
 
@@ -115,6 +137,8 @@ def _wide_font() -> tuple[str, str] | None:
 
 
 def _family(path: str) -> tuple[str, str] | None:
+    from matplotlib.ft2font import FT2Font
+
     try:
         font = FT2Font(path)
     except (OSError, RuntimeError):

@@ -30,9 +30,8 @@ def margins_command(
 ) -> NextCommand | None:
     """Compute gain, phase and delay margin, Ms and bandwidth of the loop, with bounds; propose a filter if needed.
 
-    Writes margins.png to the run directory.
+    Writes margins.svg to the run directory.
     """
-    from livebode.cli import can_draw, tell_how_to_draw
     from livebode.configuration import Axis, FitSection
     from livebode.records import to_json
     from livebode_control.margins.loop_margins import margins_of_run
@@ -41,15 +40,13 @@ def margins_command(
     section = None if model is None else FitSection(model=model)
     loop = margins_of_run(directory, section, None if axis is None else Axis.read(axis), max_sensitivity, entry)
     into = results_directory(directory)
-    if can_draw():
-        with writing(into, RecordError):
-            save_loop_picture(loop.report, into, title=directory.name)
+    with writing(into, RecordError):
+        picture = save_loop_picture(loop.report, into, title=directory.name)
     if as_json:
         print(to_json(loop.plain()))
         return None
     show_loop(loop)
-    print(f"\n{into / 'margins.png'}" if can_draw() else "")
-    tell_how_to_draw()
+    print(f"\n{picture}")
     return NextCommand("tune" if loop.tuning.proposals else "report", directory, entry=entry)
 
 

@@ -29,7 +29,7 @@ def loop_section(loop: LoopReport, over_time: Sequence[Part]) -> Section:
     headings = (tr("margin"), tr("value"), "±", tr("unit"), tr("at Hz"), tr("range"))
     table = PrintedTable(headings, tuple(rows), (1, 2, 4), _about_margins(loop))
     caption = tr(
-        "Open loop L of the fit with its 95 % band, and the measured lines. Right: near −1, with the circle of Ms."
+        "Open loop L of the fit with its 95 % band, and the measured lines. Below: near −1, with the circle of Ms."
     )
     picture = Picture(
         "livebode_control.margins.loop_picture:loop_figure", {"curves": loop, "title": tr("Open loop")}, caption

@@ -29,7 +29,7 @@ def proposed_controller(directory: Path, entry: str | None = None) -> Section | 
             Listing(gains_toml(proposal.feedback.controller)),
             *([_filters(proposal)] if proposal.feedback.notches or proposal.feedback.low_passes else []),
             Paragraph(_reach(proposal.reach)),
-            Picture("livebode_control.proposal.tuning_picture:folded_tuning_figure", {"proposal": proposal}, caption),
+            Picture("livebode_control.proposal.tuning_picture:tuning_figure", {"proposal": proposal}, caption),
         ),
     )
 

@@ -88,7 +88,7 @@ def tune_command(
 ) -> NextCommand:
     """Propose gains and filters for the described cascade, safe for every plant within bounds; or input shapers.
 
-    Writes tune.png, the gains as gains.toml, the filters as filters.h and filters.st, and for `livebode report` the
+    Writes tune.svg, the gains as gains.toml, the filters as filters.h and filters.st, and for `livebode report` the
     whole as tune.json, to the run directory; nothing to a machine. The exit code is 2 if no controller meets the
     specification. With --entry of a matrix run it is the controller between that output and input, and the plant that
     it sees while the other [[loop.controllers]] are active as described.
@@ -104,11 +104,11 @@ def tune_command(
         return NextCommand("report", directory)
     if entry is not None and (schedule or strokes is not None):
         raise _not_of_an_entry()
-    from livebode.cli import can_draw, tell_how_to_draw
     from livebode.configuration import read_loop
     from livebode.records import to_json
     from livebode_control.proposal.stored_proposal import store_proposal
     from livebode_control.proposal.tune_report import feedforward_of, schedule_run, tune_run
+    from livebode_control.proposal.tuning_picture import save_tuning_picture
     from livebode_control.tuning import LoopSpecification
     from livebode_control.tuning.code_text import c_header, odrive_text, structured_text
     from livebode_control.tuning.gains_text import gains_toml
@@ -134,11 +134,8 @@ def tune_command(
     gains = schedule_run(directory, specification, other, loop_checked=loop_checked) if schedule else None
     into = results_directory(directory)
     with writing(into, RecordError):
-        if can_draw():
-            from livebode_control.proposal.tuning_picture import save_tuning_picture
-
-            title = directory.name if entry is None else f"{directory.name}: {entry}"
-            save_tuning_picture(proposal, into, gains=gains, feedforward=forward, title=title)
+        title = directory.name if entry is None else f"{directory.name}: {entry}"
+        save_tuning_picture(proposal, into, gains=gains, feedforward=forward, title=title)
         store_proposal(proposal, into, other, entry)
         write_whole(into / "filters.h", c_header(proposal.feedback.biquads).encode())
         write_whole(into / "gains.toml", gains_toml(proposal.feedback.controller).encode())
@@ -160,10 +157,16 @@ def tune_command(
             print(f"of the controller {entry} alone: the other controllers are active as described, and do not change")
         if gains is not None:
             show_schedule(gains)
-        also = {"odrive.txt": odrive, "gains.csv": schedule, "tune.png": can_draw()}
-        written = ["tune.json", "gains.toml", "filters.h", "filters.st", *(name for name, use in also.items() if use)]
+        also = {"odrive.txt": odrive, "gains.csv": schedule}
+        written = [
+            "tune.json",
+            "tune.svg",
+            "gains.toml",
+            "filters.h",
+            "filters.st",
+            *(name for name, use in also.items() if use),
+        ]
         print(f"\n{into}: {', '.join(written)}")
-        tell_how_to_draw()
     if not proposal.met:
         raise TuneError(
             "specification-unmet",

@@ -49,7 +49,7 @@ def friction_command(
         typer.Option(metavar="SPEED", help="Speed of standstill. \\[default: 1 % of the highest speed]"),
     ] = None,
     picture: Annotated[
-        Path | None, typer.Option(metavar="PNG", help="Picture to write. \\[default: friction.png in RUN]")
+        Path | None, typer.Option(metavar="SVG", help="Picture to write. \\[default: friction.svg in RUN]")
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace an existing picture.")] = False,
     as_json: Json = False,
@@ -59,7 +59,6 @@ def friction_command(
     The channels default to those of the run or configuration. The strokes need no excitation; it does not disturb
     if its lines are above the band, and --slowest is above the speed to which it shakes the axis at standstill.
     """
-    from livebode.cli import can_draw, tell_how_to_draw
     from livebode.export import check_free
     from livebode.preparation import motion_part
     from livebode.records import to_json
@@ -73,8 +72,8 @@ def friction_command(
         part=motion_part(from_, to),
     )  # fmt: skip
     report = friction_of(strokes, places=places, band_hz=band, slowest=slowest)
-    into = picture or (None if strokes.run is None else results_directory(strokes.run) / "friction.png")
-    if into is not None and can_draw():
+    into = picture or (None if strokes.run is None else results_directory(strokes.run) / "friction.svg")
+    if into is not None:
         from livebode_control.strokes.friction_picture import save_friction_picture
 
         with writing(into, OutputError):
@@ -84,8 +83,7 @@ def friction_command(
         return None
     show_friction(report)
     if into is not None:
-        print(f"\n{into}" if can_draw() else "")
-        tell_how_to_draw()
+        print(f"\n{into}")
     if not places and picture is None:
         return NextCommand.again(places=_PLACES)
     return None if strokes.run is None else NextCommand("report", strokes.run)

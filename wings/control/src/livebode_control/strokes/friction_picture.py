@@ -8,11 +8,25 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.pictures import drawing, heading, new_figure, save, style
+from livebode.pictures import (
+    ABOVE,
+    BELOW,
+    LIGHT,
+    Band,
+    Bars,
+    Dots,
+    Entry,
+    Figure,
+    Mark,
+    Panel,
+    Trace,
+    room,
+    save_svg,
+    scale_around,
+    value_scale,
+)
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from livebode.motion import FrictionCurve
 
 _POINTS = 200
@@ -30,62 +44,68 @@ class FrictionCurves(Protocol):
     def places(self) -> FrictionCurve | None: ...
 
 
-def save_friction_picture(curves: FrictionCurves, path: Path, *, title: str = "", dark: bool = False) -> Path:
+def save_friction_picture(curves: FrictionCurves, path: Path, *, title: str = "") -> Path:
     """Write the picture."""
-    return save(friction_figure(curves, title=title, dark=dark), path, style(dark))
+    return save_svg(friction_figure(curves, title=title), path)
 
 
-def friction_figure(curves: FrictionCurves, *, title: str = "", dark: bool = False) -> Figure:
+def friction_figure(curves: FrictionCurves, *, title: str = "") -> Figure:
     """Friction over speed: dots are the smoothed input without inertia and constant force, the band covers 95 %.
 
-    The dashed line is that of each direction. With places, Coulomb friction over the position is on the right.
+    The dashed line is that of each direction. With places, Coulomb friction over the position is below.
     """
-    look, curve, each = style(dark), curves.curve, curves.directions
-    columns = 1 if curves.places is None else 2
-    with drawing(look):
-        figure = new_figure(7.2 + 4.6 * (columns - 1), 4.6)
-        width, height = figure.get_size_inches()
-        grid = figure.add_gridspec(
-            1, columns, width_ratios=[1.5, 1.0][:columns], left=0.85 / width, right=0.985, top=1 - 1.0 / height,
-            bottom=0.6 / height, wspace=0.22,
-        )  # fmt: skip
-        heading(figure, look, title or "Friction", _facts(curve), 0.85 / width)
-        axes = figure.add_subplot(grid[0, 0])
-        speed, friction = curve.measured[:, :: max(curve.measured.shape[1] // _DOTS, 1)]
-        axes.plot(speed, friction, ".", color=look.muted, alpha=0.35, markersize=3, label="measured")
-        for sign in (-1, 1):
-            v = sign * np.linspace(max(curve.speed[0], 1e-3 * curve.speed[1]), curve.speed[1], _POINTS)
-            value, bound = curve.at(v)
-            axes.fill_between(v, value - bound, value + bound, color=look.run, alpha=0.25, linewidth=0)
-            axes.plot(v, value, color=look.run, linewidth=1.8, label=_once("both directions, 95 %", sign))
-            axes.plot(
-                v,
-                _with_offset(each, curve, v),
-                "--",
-                color=look.newest,
-                linewidth=1.2,
-                label=_once("each direction", sign),
-            )
-        axes.axhline(0.0, color=look.grid, linewidth=0.8, zorder=0)
-        axes.axvline(0.0, color=look.grid, linewidth=0.8, zorder=0)
-        axes.set_xlabel(labelled("speed", speed_unit(curve)))
-        axes.set_ylabel(labelled("friction", curve.units[curve.index("coulomb")]))
-        axes.legend(loc="upper left")
-        if curves.places is not None:
-            places = figure.add_subplot(grid[0, 1])
-            indices = [curves.places.index(f"coulomb_{j + 1}") for j in range(curves.places.places.size)]
-            places.errorbar(
-                curves.places.places, curves.places.value[indices], curves.places.bound()[indices],
-                color=look.run, marker="o", markersize=4, capsize=3, linewidth=1.4,
-            )  # fmt: skip
-            places.set_xlabel("position")
-            places.set_ylabel(labelled("Coulomb friction", curve.units[curve.index("coulomb")]))
-    return figure
+    curve, each = curves.curve, curves.directions
+    dots = friction_dots(curve)
+    marks: list[Mark] = [dots]
+    drawn = [dots.y]
+    for sign in (-1, 1):
+        v = sign * np.linspace(max(curve.speed[0], 1e-3 * curve.speed[1]), curve.speed[1], _POINTS)
+        value, bound = curve.at(v)
+        marks.append(Band("bound", v, value - bound, value + bound, LIGHT.run, 0.25))
+        marks.append(Trace("both", v, value, LIGHT.run, 1.8))
+        marks.append(Trace("each", v, _with_offset(each, curve, v), LIGHT.newest, 1.2, "dashed"))
+        drawn += [value - bound, value + bound]
+    unit = curve.units[curve.index("coulomb")]
+    reach = 1.04 * max(float(np.abs(dots.x).max(initial=0.0)), curve.speed[1])
+    x, y = (
+        value_scale(-reach, reach, labelled("speed", speed_unit(curve))),
+        scale_around(drawn, labelled("friction", unit)),
+    )
+    left, height = room(y), 260.0
+    zero: list[Mark] = [
+        Trace("zero", np.array([-reach, reach]), np.zeros(2), LIGHT.muted, 0.8),
+        Trace("zero", np.zeros(2), np.array([y.low, y.high]), LIGHT.muted, 0.8),
+    ]
+    panels = [Panel(left, ABOVE, 588.0 - left, height, x, y, [*zero, *marks])]
+    top = ABOVE + height + BELOW
+    if curves.places is not None:
+        panels.append(_places(curves.places, labelled("Coulomb friction", unit), top + ABOVE))
+        top += ABOVE + panels[-1].height + BELOW
+    key = (
+        Entry("measured", LIGHT.muted, "dot"), Entry("both directions, 95 %", LIGHT.run),
+        Entry("each direction", LIGHT.newest, "dashed"),
+    )  # fmt: skip
+    return Figure(title or "Friction", _facts(curve), key, panels, top)
 
 
-def _once(label: str, sign: int) -> str:
-    """The label for one of the two branches; Matplotlib omits one with an underscore from the legend."""
-    return label if sign > 0 else f"_{label}"
+def friction_dots(curve: FrictionCurve) -> Dots:
+    """Measured friction over speed; of many values some."""
+    speed, friction = curve.measured[:, :: max(curve.measured.shape[1] // _DOTS, 1)]
+    return Dots("measured", speed, friction, LIGHT.muted, 2.0, alpha=0.35)
+
+
+def _places(curve: FrictionCurve, label: str, top: float) -> Panel:
+    indices = [curve.index(f"coulomb_{j + 1}") for j in range(curve.places.size)]
+    value, bound = curve.value[indices], curve.bound()[indices]
+    y = scale_around([value - bound, value + bound], label)
+    x = scale_around([curve.places], "position")
+    left = room(y)
+    marks = (
+        Trace("coulomb", curve.places, value, LIGHT.run, 1.4),
+        Bars("bound", curve.places, value - bound, value + bound, LIGHT.run),
+        Dots("coulomb", curve.places, value, LIGHT.run),
+    )
+    return Panel(left, top, 588.0 - left, 150.0, x, y, marks)
 
 
 def _with_offset(each: FrictionCurve, curve: FrictionCurve, v: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -104,11 +124,11 @@ def labelled(name: str, unit: str) -> str:
     return f"{name}, {unit}" if unit else name
 
 
-def _facts(curve: FrictionCurve) -> str:
+def _facts(curve: FrictionCurve) -> list[str]:
     bound = curve.bound()
     shown = {"coulomb": "Coulomb", "viscous": "viscous", "stribeck": "Stribeck", "inertia": "inertia"}
-    return " · ".join(
+    return [
         f"{shown[name]} {curve.value[i]:.4g} ± {bound[i]:.2g} {curve.units[i]}".rstrip()
         for i, name in enumerate(curve.names)
         if name in shown
-    )
+    ]

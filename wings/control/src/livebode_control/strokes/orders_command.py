@@ -66,7 +66,7 @@ def orders_command(
         typer.Option(metavar="FILE", help="Write a feedforward table of the motor: .csv, .h (C) or .st (TwinCAT)."),
     ] = None,
     picture: Annotated[
-        Path | None, typer.Option(metavar="PNG", help="Picture to write. \\[default: orders.png in RUN]")
+        Path | None, typer.Option(metavar="SVG", help="Picture to write. \\[default: orders.svg in RUN]")
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace an existing table or picture.")] = False,
     as_json: Json = False,
@@ -77,7 +77,6 @@ def orders_command(
     the time are subtracted if the strokes separate them from the orders; else windows that meet them are left out:
     record strokes at several speeds. With --baseline, orders are compared with those of an earlier recording.
     """
-    from livebode.cli import can_draw, tell_how_to_draw
     from livebode.configuration import OrdersSection
     from livebode.export import check_free
     from livebode.preparation import motion_part
@@ -111,8 +110,8 @@ def orders_command(
         channels = {motion.kind: motion.output, "input": motion.input, "angle": motion.angle}
         before = found_in(read_strokes(location(baseline), rate_hz=rate, time=time, **channels))  # type: ignore[arg-type]
         changes = report.changes_from(before, phases=not other_zero)
-    into = picture or (None if motion.run is None else results_directory(motion.run) / "orders.png")
-    if into is not None and can_draw():
+    into = picture or (None if motion.run is None else results_directory(motion.run) / "orders.svg")
+    if into is not None:
         from livebode_control.strokes.orders_picture import save_orders_picture
 
         with writing(into, OutputError):
@@ -129,8 +128,7 @@ def orders_command(
     if table is not None:
         print(f"feedforward of the motor, to be added to the torque: {table}")
     if into is not None:
-        print(f"\n{into}" if can_draw() else "")
-        tell_how_to_draw()
+        print(f"\n{into}")
     return _next(report, motion.run, written=table is not None or picture is not None)
 
 

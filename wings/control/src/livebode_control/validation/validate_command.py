@@ -58,7 +58,7 @@ def validate_command(
     """Test the fitted model on another recording, or with --loop the described controllers on the recorded signals.
 
     With --on, the model is simulated with the other recording, and the residual is tested for correlation with the
-    signals; writes validation.png to the run directory. The parameters are constant: the mean over the run, also for a
+    signals; writes validation.svg to the run directory. The parameters are constant: the mean over the run, also for a
     machine whose plant changes with position. The channels default to those of the run. A model whose simulation is
     not valid, such as of a double integrator that drifts, is judged at the lines: LOG is tracked as the run was. So is
     an entry of a matrix run.
@@ -95,7 +95,6 @@ def _validate_model(
     channels: Channels, at_lines: bool, entry: str | None, *, as_json: bool,
 ) -> None:  # fmt: skip
     """Test the models on a recording or another run, write their picture, and print the verdicts."""
-    from livebode.cli import tell_how_to_draw
     from livebode.configuration import FitSection, check_model, recorded_configuration
     from livebode.records import RunRecord, to_json
     from livebode_control.validation.run_validation import validate_run
@@ -139,7 +138,6 @@ def _validate_model(
         print(sentence)
     if picture is not None:
         print(f"\n{picture}")
-    tell_how_to_draw()
 
 
 def _reason(section: FitSection, on: Path, at_lines: bool, entry: str | None) -> str:
@@ -156,11 +154,7 @@ def _reason(section: FitSection, on: Path, at_lines: bool, entry: str | None) ->
     return f"a {section.model} model is not simulated" if section.model in POLE_MODELS else ""
 
 
-def _picture(results: list[Validation], directory: Path, on: Path) -> Path | None:
-    from livebode.cli import can_draw
-
-    if not can_draw():
-        return None
+def _picture(results: list[Validation], directory: Path, on: Path) -> Path:
     from livebode_control.validation.validation_picture import save_validation_picture
 
     into = results_directory(directory)

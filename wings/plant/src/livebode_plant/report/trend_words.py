@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from itertools import pairwise
 from math import isfinite
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,17 +14,34 @@ from numpy.typing import NDArray
 from livebode.arrays import Floats
 from livebode.core import with_bound
 from livebode.language import listed, number, quantity_name, tr, trn
-from livebode.pictures import Style, drawing, heading, labelled, new_figure, plain, shortened, style
+from livebode.pictures import (
+    ABOVE,
+    LIGHT,
+    WIDTH,
+    Band,
+    Bars,
+    DotKind,
+    Dots,
+    Entry,
+    Figure,
+    Mark,
+    Panel,
+    Scale,
+    Shade,
+    Tag,
+    Trace,
+    labelled,
+    room,
+    scale_around,
+    stacked,
+    value_scale,
+)
 from livebode_plant.trending import LOGARITHMIC, ChangePoint, History, Ranked, Trend
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 _DAY_S = 86400.0
 _GAP_S = 28 * _DAY_S
 _REACH = 0.35  # of the range of the trend and the middle of the runs; what is beyond has a mark at the edge
-_COLUMNS = 2
+_COLUMNS, _SMALL = 2, 110.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +71,7 @@ class Year:
     """
 
     title: str
-    facts: str
+    facts: Sequence[str]
     label: str
     time_s: Floats
     value: Floats
@@ -68,82 +84,57 @@ class Year:
     covariates: Mapping[str, Floats] = field(default_factory=dict)
 
 
-def year_figure(year: Year, *, dark: bool = False) -> Figure:
+def year_figure(year: Year) -> Figure:
     """The runs with their bounds, the trend with its band, the changes, gaps without runs, and each covariate below."""
-    look = style(dark)
-    below = len(year.covariates)
-    with drawing(look):
-        figure = new_figure(9.0, 4.3 + 1.15 * below)
-        height_in = figure.get_size_inches()[1]
-        grid = figure.add_gridspec(
-            1 + below, 1, height_ratios=[3.0, *[0.9] * below], left=0.095, right=0.985, top=1 - 1.05 / height_in,
-            bottom=0.45 / height_in, hspace=0.16,
-        )  # fmt: skip
-        heading(figure, look, year.title, year.facts, 0.095)
-        axes = figure.add_subplot(grid[0])
-        _panel(axes, look, year, year.label)
-        _name_changes(axes, look, year)
-        panels = [axes]
-        for row, (label, values) in enumerate(year.covariates.items(), 1):
-            own = figure.add_subplot(grid[row], sharex=axes)
-            own.plot(_dates(year.time_s), values, ".", markersize=3, color=look.traces[1])
-            own.set_ylabel(shortened(label, 24))
-            own.locator_params(axis="y", nbins=3)
-            _gaps(own, look, year.time_s)
-            plain(own)
-            panels.append(own)
-        for own in panels[:-1]:
-            own.tick_params(axis="x", labelbottom=False)
-        _key(figure, look, year, height_in)
-    return figure
+    y = value_scale(*_limits(year), year.label)
+    x = _date_scale(year.time_s, 6)
+    parts: list[tuple[Scale, list[Mark], float]] = [(y, [*_marks(year, y), *_change_names(year, x, y)], 210.0)]
+    for label, values in year.covariates.items():
+        parts.append((scale_around([values], label, 3), [_gaps(year.time_s), _dots(year, values)], 66.0))
+    left = room(*(scale for scale, _, _ in parts))
+    panels, height = stacked(x, parts, left=left, width=584.0 - left)
+    return Figure(year.title, year.facts, _key(year), panels, height)
 
 
-def years_figure(years: Sequence[Year], *, width_in: float = 9.0, dark: bool = False) -> Figure:
+def _dots(year: Year, values: Floats) -> Dots:
+    return Dots("covariate", year.time_s, values, LIGHT.traces[1], 2.5)
+
+
+def years_figure(years: Sequence[Year]) -> Figure:
     """Small pictures of several machines, two in a row."""
-    look = style(dark)
+    scales = [value_scale(*_limits(year), "", 4) for year in years]
+    left = room(*scales)
+    panels = []
+    for i, (year, y) in enumerate(zip(years, scales)):
+        across, down = i % _COLUMNS, i // _COLUMNS
+        place = left + across * WIDTH / _COLUMNS, ABOVE + down * (_SMALL + ABOVE + 24.0)
+        x = _date_scale(year.time_s, 3)
+        panels.append(Panel(*place, WIDTH / _COLUMNS - left - 16.0, _SMALL, x, y, _marks(year, y), title=year.title))
     rows = -(-len(years) // _COLUMNS)
-    with drawing(look):
-        figure = new_figure(width_in, 0.35 + 1.85 * rows)
-        height_in = figure.get_size_inches()[1]
-        grid = figure.add_gridspec(
-            rows, _COLUMNS, left=0.075, right=0.965, top=1 - 0.3 / height_in, bottom=0.32 / height_in, hspace=0.5,
-            wspace=0.2,
-        )  # fmt: skip
-        for i, year in enumerate(years):
-            axes = figure.add_subplot(grid[i // _COLUMNS, i % _COLUMNS])
-            _panel(axes, look, year, "", dates=6)
-            axes.set_title(shortened(year.title, 60), loc="left", size=10, color=look.ink, pad=5)
-            axes.locator_params(axis="y", nbins=4)
-    return figure
+    return Figure("", (), (), panels, rows * (_SMALL + ABOVE + 24.0) + 8.0)
 
 
-def _panel(axes: Axes, look: Style, year: Year, label: str, dates: int = 8) -> None:
-    low, high = _limits(year)
-    days = _dates(year.time_s)
-    _gaps(axes, look, year.time_s)
-    inside = (year.value >= low) & (year.value <= high)
-    for shown, colour in ((year.counted & inside, look.run), (~year.counted & inside, look.muted)):
-        known = shown & np.isfinite(year.bound)
-        axes.vlines(
-            days[known], (year.value - year.bound)[known], (year.value + year.bound)[known],
-            color=colour, alpha=0.3, linewidth=1.1, gid="bound",
-        )  # fmt: skip
-        axes.plot(days[shown], year.value[shown], ".", markersize=4.5, color=colour, gid="run")
-    for beyond, edge, mark in ((year.value < low, low, "v"), (year.value > high, high, "^")):
-        axes.plot(days[beyond], np.full(int(beyond.sum()), edge), mark, markersize=4, color=look.muted, clip_on=False)
-    edges = [0, *(int(np.searchsorted(year.time_s, t)) for t in year.jumps), len(days)]
+def _marks(year: Year, y: Scale) -> list[Mark]:
+    marks: list[Mark] = [_gaps(year.time_s)]
+    inside = (year.value >= y.low) & (year.value <= y.high)
+    for shown, colour in ((year.counted & inside, LIGHT.run), (~year.counted & inside, LIGHT.muted)):
+        low, high = (year.value - year.bound)[shown], (year.value + year.bound)[shown]
+        marks.append(Bars("bound", year.time_s[shown], low, high, colour, 1.1, 0.3))
+        marks.append(Dots("run", year.time_s[shown], year.value[shown], colour, 3.0))
+    size = 0.02 * (y.high - y.low)
+    beyond: tuple[tuple[NDArray[np.bool_], float, DotKind], ...] = (
+        (year.value < y.low, y.low + size, "down"), (year.value > y.high, y.high - size, "up"),
+    )  # fmt: skip
+    for of, edge, kind in beyond:
+        marks.append(Dots("beyond", year.time_s[of], np.full(int(of.sum()), edge), LIGHT.muted, 5.0, kind))
+    edges = [0, *(int(np.searchsorted(year.time_s, t)) for t in year.jumps), len(year.time_s)]
     for first, stop in pairwise(edges):
         part = slice(first, stop)
-        band = (year.line - year.line_bound)[part], (year.line + year.line_bound)[part]
-        axes.fill_between(days[part], *band, color=look.newest, alpha=0.25, linewidth=0, gid="band")
-        axes.plot(days[part], year.line[part], color=look.newest, linewidth=1.7, gid="trend")
-    for time_s, _ in year.changes:
-        axes.axvline(_dates(np.array([time_s]))[0], color=look.ink, linewidth=0.9, dashes=(4, 3), gid="change")
-    axes.set_ylim(low, high)
-    axes.set_ylabel(label)
-    axes.ticklabel_format(axis="y", useOffset=False, scilimits=(-4, 7))
-    _date_ticks(axes, year.time_s, dates)
-    plain(axes)
+        times, line, half = year.time_s[part], year.line[part], year.line_bound[part]
+        marks.append(Band("band", times, line - half, line + half, LIGHT.newest, 0.25))
+        marks.append(Trace("trend", times, line, LIGHT.newest, 1.7))
+    ends = np.array([y.low, y.high])
+    return marks + [Trace("change", np.full(2, time_s), ends, LIGHT.ink, 0.9, "dashed") for time_s, _ in year.changes]
 
 
 def _limits(year: Year) -> tuple[float, float]:
@@ -155,59 +146,53 @@ def _limits(year: Year) -> tuple[float, float]:
     return low - margin, high + margin
 
 
-def _gaps(axes: Axes, look: Style, time_s: Floats) -> None:
-    """Shade spans of four weeks and more without a run."""
-    dates = _dates(time_s)
-    for i in np.flatnonzero(np.diff(time_s) > _GAP_S):
-        axes.axvspan(dates[i], dates[i + 1], color=look.nothing, alpha=0.6, linewidth=0, gid="gap")
+def _gaps(time_s: Floats) -> Shade:
+    """Spans of four weeks and more without a run."""
+    long = np.flatnonzero(np.diff(time_s) > _GAP_S)
+    return Shade("gap", time_s[long], time_s[long + 1], LIGHT.nothing)
 
 
-def _name_changes(axes: Axes, look: Style, year: Year) -> None:
-    """The text of each change above its line; those of neighbours on different heights."""
+def _change_names(year: Year, x: Scale, y: Scale) -> list[Tag]:
+    """The text of each change beside its line; those of neighbours on different heights."""
+    tags = []
     for place, (time_s, text) in enumerate(year.changes):
-        share = (time_s - year.time_s[0]) / max(year.time_s[-1] - year.time_s[0], 1.0)
-        right = share > 0.6
-        axes.annotate(
-            shortened(text, 60), xy=(float(_dates(np.array([time_s]))[0]), 0.96 - 0.08 * (place % 3)),
-            xycoords=("data", "axes fraction"), xytext=(-5 if right else 5, 0), textcoords="offset points",
-            ha="right" if right else "left", va="top", size=9, color=look.ink, parse_math=False,
-        )  # fmt: skip
+        height = y.low + (0.9 - 0.1 * (place % 3)) * (y.high - y.low)
+        right = float(x.share(time_s)) > 0.5
+        beside = time_s + (-0.01 if right else 0.01) * (x.high - x.low)
+        tags.append(Tag(text, beside, height, LIGHT.ink, "end" if right else "start"))
+    return tags
 
 
-def _date_ticks(axes: Axes, time_s: Floats, most: int) -> None:
-    from matplotlib.dates import AutoDateLocator, DateFormatter
+def _date_scale(time_s: Floats, most: int) -> Scale:
+    """Time with the begins of days, months or years as its numbers, in UTC."""
+    first, last = float(time_s[0]), float(time_s[-1])
+    margin = 0.015 * (last - first) or _DAY_S
+    low, high = first - margin, last + margin
+    days = (high - low) / _DAY_S
+    if days > 31 * (most - 1):
+        months = next((n for n in (1, 2, 3, 6, 12, 24, 60, 120) if days / 30.4 / n <= most), 240)
+        begin = datetime.fromtimestamp(low, UTC)
+        numbers = range(12 * begin.year + begin.month - 1, 12 * begin.year + begin.month + int(days / 28) + 2)
+        every = [datetime(n // 12, n % 12 + 1, 1, tzinfo=UTC).timestamp() for n in numbers if n % months == 0]
+        words = "%Y-%m"
+    else:
+        step = next(n for n in (1, 2, 5, 10, 20, 40) if days / n <= most / 1.4) * _DAY_S
+        every = [step * n for n in range(int(low / step), int(high / step) + 2)]
+        words = "%Y-%m-%d"
+    ticks = [at for at in every if low <= at <= high]
+    return Scale(low, high, ticks, [datetime.fromtimestamp(at, UTC).strftime(words) for at in ticks])
 
-    locator = AutoDateLocator(minticks=3, maxticks=most)  # type: ignore[no-untyped-call]
-    axes.xaxis.set_major_locator(locator)
-    days = float(time_s[-1] - time_s[0]) / _DAY_S
-    axes.xaxis.set_major_formatter(DateFormatter("%Y-%m" if days > 120 else "%Y-%m-%d", tz=UTC))  # type: ignore[no-untyped-call]
-    axes.margins(x=0.015)
 
-
-def _dates(time_s: Floats) -> Floats:
-    """Days since 1970, which Matplotlib's dates are."""
-    return np.asarray(time_s / _DAY_S)
-
-
-def _key(figure: Figure, look: Style, year: Year, height_in: float) -> None:
-    from matplotlib.lines import Line2D
-    from matplotlib.patches import Patch
-
-    dot = {"linestyle": "", "marker": ".", "markersize": 6}
-    entries: list[tuple[Line2D | Patch, str]] = [
-        (Line2D([], [], color=look.run, **dot), tr("run with its bound")),  # type: ignore[arg-type]
-        (Line2D([], [], color=look.newest, linewidth=1.7), tr("trend")),
-        (Patch(facecolor=look.newest, alpha=0.3), tr("its 95 % bound")),
-    ]
+def _key(year: Year) -> list[Entry]:
+    entries = [
+        Entry(tr("run with its bound"), LIGHT.run, "dot"), Entry(tr("trend"), LIGHT.newest),
+        Entry(tr("its 95 % bound"), LIGHT.newest, "band"),
+    ]  # fmt: skip
     if not year.counted.all():
-        entries.insert(1, (Line2D([], [], color=look.muted, **dot), tr("outlier")))  # type: ignore[arg-type]
+        entries.insert(1, Entry(tr("outlier"), LIGHT.muted, "dot"))
     if (np.diff(year.time_s) > _GAP_S).any():
-        entries.append((Patch(facecolor=look.nothing, alpha=0.6), tr("no runs")))
-    figure.legend(
-        [handle for handle, _ in entries], [text for _, text in entries], loc="upper left",
-        bbox_to_anchor=(0.095, 1 - 0.74 / height_in), ncols=5, borderpad=0.0, borderaxespad=0.0, handlelength=1.4,
-        columnspacing=1.8,
-    )  # fmt: skip
+        entries.append(Entry(tr("no runs"), LIGHT.muted, "band"))
+    return entries
 
 
 def day(unix_s: float) -> str:
@@ -320,7 +305,7 @@ def year_of(history: History, machine: str, trend: Trend) -> Year:
         slope = tr("{slope} since {day}", slope=slope, day=day(trend.slope_since_s))
     return Year(
         title=tr("{quantity} of {machine}", quantity=quantity_name(history.name), machine=machine),
-        facts=f"{slope} · {about_method(trend)}",
+        facts=(slope, about_method(trend)),
         label=labelled(history.name, unit),
         time_s=trend.time_s,
         value=trend.adjusted,

@@ -32,11 +32,10 @@ def trend_command(
         Path | None,
         typer.Option(
             metavar="FILE",
-            help="Also write the worst machine's picture (.png) or the table of all machines (.csv); without QUANTITY "
+            help="Also write the worst machine's picture (.svg) or the table of all machines (.csv); without QUANTITY "
             "write FILE.html and FILE.pdf. \\[default: hall-report]",
         ),
     ] = None,
-    dark: Annotated[bool, typer.Option("--dark", help="Draw the picture light on dark.")] = False,
     name: Annotated[
         str, typer.Option(metavar="TEXT", help="Title of the page, without QUANTITY. \\[default: name of the lake]")
     ] = "",
@@ -59,8 +58,8 @@ def trend_command(
     from livebode_plant.lake import Lake
     from livebode_plant.trending import assess, history
 
-    picture = out is not None and out.suffix.lower() in (".png", ".csv")
-    of_one = {"--by": chosen.by is not None, "--dark": dark, f"--out={str(out)!r}": picture}
+    picture = out is not None and out.suffix.lower() in (".svg", ".csv")
+    of_one = {"--by": chosen.by is not None, f"--out={str(out)!r}": picture}
     _check(quantity, of_one, {"--name": name, "--language": language})
     lake = Lake(lake_url(archive))
     if quantity is None:
@@ -72,12 +71,12 @@ def trend_command(
         return NextCommand("archive", "trend", archive, names[0]) if names else None
     if out is not None and not picture:
         raise UsageError(
-            "unreadable", f"--out={str(out)!r} is neither a .png nor a .csv", "choose one of them", argument="--out"
+            "unreadable", f"--out={str(out)!r} is neither a .svg nor a .csv", "choose one of them", argument="--out"
         )
     runs = history(lake, quantity, chosen.selection(By.machine))
     (of,) = assess([runs], limit)
     if out is not None:
-        _write(of, out, dark=dark, force=force)
+        _write(of, out, force=force)
     if as_json:
         print(to_json(plain(of)))
         return None
@@ -190,14 +189,13 @@ def remarks(of: Assessment) -> list[str]:
     return lines
 
 
-def _write(of: Assessment, out: Path, *, dark: bool, force: bool) -> None:
+def _write(of: Assessment, out: Path, *, force: bool) -> None:
     from livebode.export import save
 
     if out.suffix.lower() == ".csv":
         save(out, lambda partial: _write_csv(of, partial), force=force)
         return
-    from livebode.pictures import save as write_picture
-    from livebode.pictures import style
+    from livebode.pictures import save_svg
     from livebode_plant.report.trend_words import year_figure, year_of
 
     if not of.ranked:
@@ -205,8 +203,8 @@ def _write(of: Assessment, out: Path, *, dark: bool, force: bool) -> None:
             "missing", "no machine has a trend to draw", "select others, or print the table", argument="--out"
         )
     worst = of.ranked[0]
-    figure = year_figure(year_of(of.history, worst.machine, worst.trend), dark=dark)
-    save(out, lambda partial: write_picture(figure, partial, style(dark)), force=force)
+    figure = year_figure(year_of(of.history, worst.machine, worst.trend))
+    save(out, lambda partial: save_svg(figure, partial), force=force)
 
 
 def _write_csv(of: Assessment, path: Path) -> None:
