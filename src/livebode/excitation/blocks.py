@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Floats
 from livebode.excitation._medians import medians
+from livebode.kernel import PeriodDrift, period_levels, straight_periods
 
 
 def cut(x: Floats, period: int) -> Floats:
@@ -20,20 +21,14 @@ def cut(x: Floats, period: int) -> Floats:
     count = x.size // period
     blocks = x[: count * period].reshape(count, period)
     typical = medians(blocks, axis=0)
-    level = medians(blocks - typical, axis=1)
+    level = period_levels(blocks, typical)
     slope = np.diff(level, append=level[-1]) if count > 1 else np.zeros(1)
     if count > 1:
         slope[-1] = slope[-2]
     before = np.concatenate((slope[:1], slope[:-1]))
     position = (np.arange(period) + 0.5) / period - 0.5  # position about the middle of the period
-    middle = np.searchsorted(position, 0.0)
-    drift = np.empty_like(blocks)
-    np.multiply.outer(before, position[:middle], out=drift[:, :middle])
-    np.multiply.outer(slope, position[middle:], out=drift[:, middle:])
-    drift += level[:, np.newaxis]
-    np.subtract(blocks, drift, out=drift)
-    drift -= typical.mean()
-    return drift
+    middle = int(np.searchsorted(position, 0.0))
+    return straight_periods(blocks, PeriodDrift(position, middle, level, before, slope, float(typical.mean())))
 
 
 def spectra(blocks: Floats, bins: slice | NDArray[np.bool_] = slice(None)) -> Complex:

@@ -8,6 +8,7 @@ from livebode.arrays import Flags, Floats
 from livebode.core import normal_quantile
 from livebode.excitation._medians import medians
 from livebode.excitation.blocks import spectra
+from livebode.kernel import period_reach
 
 FALSE_ALARM = 1e-3  # probability that any period of a recording is marked by chance
 # With fewer periods there is no majority of steady ones.
@@ -48,8 +49,7 @@ def unlike(blocks: Floats, excited: Flags) -> Flags:
     usual = medians(away, axis=0) + (_ROUNDING * np.abs(real)) ** 2
     usual += np.finfo(np.float64).tiny
     at_lines = np.sqrt(np.mean(away / usual, axis=1))
-    size = np.maximum(blocks.max(axis=1), -blocks.min(axis=1))
-    at_samples = np.max(np.abs(blocks - medians(blocks, axis=0)), axis=1)
+    at_samples, size = period_reach(blocks, medians(blocks, axis=0))
     return _far(at_lines, np.zeros(count)) | _far(at_samples, _ROUNDING * _median(size))
 
 
