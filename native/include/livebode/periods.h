@@ -23,7 +23,8 @@ typedef struct {
  * mean of the two middle ones of an even number. LB_ERROR_SIZE for more than LB_PERIODS_MAX. */
 lb_status lb_periods_typical(const lb_periods *of, double *out);
 
-/* Median of each period less another one [window], which may be missing: out [periods]; work [LB_PERIODS_WORK(window)]. */
+/* Median of each period less another one [window], which may be missing: out [periods]; work [LB_PERIODS_WORK(window)].
+ */
 lb_status lb_periods_levels(const lb_periods *of, const double *less, double *work, double *out);
 
 /* Straight pieces, from the middle of each period to that of the next one. */

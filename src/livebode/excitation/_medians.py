@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from livebode.arrays import Floats
 from livebode.kernel import PERIODS_MAX, period_levels, typical_period
 

@@ -22,13 +22,21 @@ def cut(x: Floats, period: int) -> Floats:
     blocks = x[: count * period].reshape(count, period)
     typical = medians(blocks, axis=0)
     level = period_levels(blocks, typical)
-    slope = np.diff(level, append=level[-1]) if count > 1 else np.zeros(1)
-    if count > 1:
-        slope[-1] = slope[-2]
-    before = np.concatenate((slope[:1], slope[:-1]))
-    position = (np.arange(period) + 0.5) / period - 0.5  # position about the middle of the period
-    middle = int(np.searchsorted(position, 0.0))
-    return straight_periods(blocks, PeriodDrift(position, middle, level, before, slope, float(typical.mean())))
+    return straight_periods(blocks, PeriodDrift(*places(period), level, *slopes(level), float(typical.mean())))
+
+
+def places(period: int) -> tuple[Floats, int]:
+    """Position of each sample about the middle of its period, in periods, and the number of the first one behind it."""
+    position = (np.arange(period) + 0.5) / period - 0.5
+    return position, int(np.searchsorted(position, 0.0))
+
+
+def slopes(level: Floats) -> tuple[Floats, Floats]:
+    """Slopes of the drift through these levels of periods, before the middle of each period and behind it."""
+    behind = np.diff(level, append=level[-1]) if level.size > 1 else np.zeros(1)
+    if level.size > 1:
+        behind[-1] = behind[-2]
+    return np.concatenate((behind[:1], behind[:-1])), behind
 
 
 def spectra(blocks: Floats, bins: slice | NDArray[np.bool_] = slice(None)) -> Complex:

@@ -48,8 +48,8 @@ void straighten(nb::handle data, nb::tuple drift, int set, nb::handle out)
     const Array position(drift[0], REAL, {p.window}), level(drift[2], REAL, {p.periods}),
         before(drift[3], REAL, {p.periods}), behind(drift[4], REAL, {p.periods}),
         found(out, REAL, {p.periods, p.window}, WRITE);
-    const lb_periods_drift of = {position, nb::cast<size_t>(drift[1]), level, before, behind,
-                                 nb::cast<double>(drift[5])};
+    const lb_periods_drift of = {position, nb::cast<size_t>(drift[1]), level, before,
+                                 behind,   nb::cast<double>(drift[5])};
     call(p.size(), [&] { return lb_periods_straighten(&p.of, &of, found); });
 }
 
