@@ -22,7 +22,8 @@ typedef struct {
 
 extern const lb_periods_kernels lb_periods_baseline, lb_periods_avx2, lb_periods_avx512;
 
-#define FEW 32u /* numbers that are sorted one by one */
+#define FEW_MAX 32u    /* numbers that are sorted one by one */
+#define ROUNDS_MAX 64u /* that halve the numbers, except of those that were made to prevent it */
 #define ABREAST 2u
 
 /* Of numbers. */
@@ -171,10 +172,6 @@ static int in_order(const void *a, const void *b)
 
 static void sort_few(double *v, size_t count)
 {
-    if (count > 2u * FEW) {
-        qsort(v, count, sizeof *v, in_order);
-        return;
-    }
     for (size_t i = 1u; i < count; ++i) {
         const double value = v[i];
         size_t at = i;
@@ -183,6 +180,42 @@ static void sort_few(double *v, size_t count)
         }
         v[at] = value;
     }
+}
+
+static double middle_of_three(double a, double b, double c)
+{
+    const double low = a < b ? a : b, high = a < b ? b : a;
+    return c < low ? low : c < high ? c : high;
+}
+
+/* Keeps the numbers on that side of one of them where those of rank k - 1 and k are, or these two; often half. */
+static size_t keep_side(double *v, size_t count, size_t *k)
+{
+    const double pivot = middle_of_three(v[count / 4u], v[count / 2u], v[count - 1u - count / 4u]);
+    size_t below = 0, above = 0, kept = 0;
+    for (size_t i = 0; i < count; ++i) {
+        below += (size_t)(v[i] < pivot);
+        above += (size_t)(v[i] > pivot);
+    }
+    if (*k >= below && *k <= count - above) {
+        double under = -lb_infinity(), over = lb_infinity();
+        for (size_t i = 0; i < count; ++i) {
+            under = v[i] < pivot && v[i] > under ? v[i] : under;
+            over = v[i] > pivot && v[i] < over ? v[i] : over;
+        }
+        v[0] = *k > below ? pivot : under;
+        v[1] = *k < count - above ? pivot : over;
+        *k = 1u;
+        return 2u;
+    }
+    const double sign = *k < below ? 1.0 : -1.0;
+    for (size_t i = 0; i < count; ++i) {
+        const double value = v[i];
+        v[kept] = value;
+        kept += (size_t)(sign * value < sign * pivot);
+    }
+    *k -= *k < below ? 0 : count - above;
+    return kept;
 }
 
 /* The numbers from low to high, and how many are below; none if those of rank k - 1 and k are not among them. */
@@ -205,7 +238,7 @@ static double median(double *v, size_t count, double sum, double *work)
             return lb_not_a_number();
         }
     }
-    if (inside > FEW) {
+    if (inside > FEW_MAX) {
         const double place = (double)(k - below) / (double)inside, near = 2.0 / sqrt((double)inside);
         const double low = mean + width * (2.0 * (place - near) - 1.0), high = low + 4.0 * width * near;
         inside = keep_ranks(v, count, k, low, high, work, &below);
@@ -215,8 +248,16 @@ static double median(double *v, size_t count, double sum, double *work)
         inside = count;
         work = v;
     }
-    sort_few(work, inside);
-    return count % 2u ? work[k - below] : (work[k - below - 1u] + work[k - below]) / 2.0;
+    size_t rank = k - below;
+    for (size_t round = 0; inside > FEW_MAX && round < ROUNDS_MAX; ++round) {
+        inside = keep_side(work, inside, &rank);
+    }
+    if (inside > FEW_MAX) {
+        qsort(work, inside, sizeof *work, in_order);
+    } else {
+        sort_few(work, inside);
+    }
+    return count % 2u ? work[rank] : (work[rank - 1u] + work[rank]) / 2.0;
 }
 
 static void levels(const lb_periods *of, const double *less, double *work, double *out)
