@@ -1,8 +1,6 @@
 /* Periods of a signal. Compiled once for each instruction set; with the baseline also the choice. */
 #include "livebode/periods.h"
 
-#include <stdlib.h>
-
 #include "elementary.h"
 #include "lb_assert.h"
 #include "lines/choice.h"
@@ -22,7 +20,7 @@ typedef struct {
 
 extern const lb_periods_kernels lb_periods_baseline, lb_periods_avx2, lb_periods_avx512;
 
-#define FEW_MAX 32u    /* numbers that are sorted one by one */
+#define FEW_MAX 32u    /* numbers that are sorted at once */
 #define ROUNDS_MAX 64u /* that halve the numbers, except of those that were made to prevent it */
 #define ABREAST 2u
 
@@ -164,21 +162,22 @@ static size_t copy_between(const double *v, size_t count, double low, double hig
     return inside;
 }
 
-static int in_order(const void *a, const void *b)
+/* Shell's sort: of few numbers nearly one by one. */
+static void sort_all(double *v, size_t count)
 {
-    const double one = *(const double *)a, other = *(const double *)b;
-    return (one > other) - (one < other);
-}
-
-static void sort_few(double *v, size_t count)
-{
-    for (size_t i = 1u; i < count; ++i) {
-        const double value = v[i];
-        size_t at = i;
-        for (; at > 0 && v[at - 1u] > value; --at) {
-            v[at] = v[at - 1u];
+    size_t gap = 1u;
+    while (gap < count / 9u) {
+        gap = 3u * gap + 1u;
+    }
+    for (; gap > 0; gap /= 3u) {
+        for (size_t i = gap; i < count; ++i) {
+            const double value = v[i];
+            size_t at = i;
+            for (; at >= gap && v[at - gap] > value; at -= gap) {
+                v[at] = v[at - gap];
+            }
+            v[at] = value;
         }
-        v[at] = value;
     }
 }
 
@@ -252,11 +251,7 @@ static double median(double *v, size_t count, double sum, double *work)
     for (size_t round = 0; inside > FEW_MAX && round < ROUNDS_MAX; ++round) {
         inside = keep_side(work, inside, &rank);
     }
-    if (inside > FEW_MAX) {
-        qsort(work, inside, sizeof *work, in_order);
-    } else {
-        sort_few(work, inside);
-    }
+    sort_all(work, inside);
     return count % 2u ? work[rank] : (work[rank - 1u] + work[rank]) / 2.0;
 }
 
