@@ -12,8 +12,7 @@ import pytest
 from livebode.core import Lines
 from livebode.estimation import Settings
 from livebode.excitation import multisine
-from livebode.preparation import AlignedLog, early_spikes
-from livebode.preparation._steady import leading_transient
+from livebode.preparation import AlignedLog, early_spikes, steady
 from livebode.records import RunRecord
 from livebode.sources import open_log
 from tests.support.command import livebode, write_parquet
@@ -62,7 +61,7 @@ def test_a_transient_is_left_out_of_averages_and_bounds_and_reported(tmp_path: P
 def test_a_spike_is_found_in_every_period(tmp_path: Path, transient: float, period: int) -> None:
     log = open_log(write_parquet(tmp_path / "log.parquet", recorded(transient, spike=period)), rate_hz=RATE_HZ)
     asked = Settings(lines=LINES, spikes=("u",), **NAMES)
-    source = AlignedLog(log, (), leading_transient(AlignedLog(log, ()), asked) * WINDOW)
+    source = AlignedLog(log, (), steady(AlignedLog(log, ()), asked).first)
     early, at = early_spikes(source, asked).tolist(), period * WINDOW + 137
     # The spike behind a transient is left out with it; after nine periods the gate finds it by itself.
     assert early == ([at] if source.first <= at < source.first + 9 * WINDOW else [])
@@ -81,7 +80,7 @@ def test_motion_short_recordings_and_steady_ones_lose_nothing(tmp_path: Path) ->
     def left_out(columns: dict[str, np.ndarray]) -> int:
         size = columns["w"].size
         path = write_parquet(tmp_path / "log.parquet", {"x": np.linspace(0.2, 0.8, size)} | columns)
-        return leading_transient(AlignedLog(open_log(path, rate_hz=RATE_HZ), ()), asked)
+        return steady(AlignedLog(open_log(path, rate_hz=RATE_HZ), ()), asked).first // WINDOW
 
     still = {"x": np.full(20 * WINDOW, 0.8)}
     assert left_out(still | recorded(transient=5.0)) == 1
@@ -94,4 +93,4 @@ def test_the_first_period_of_a_real_bench_is_left_out() -> None:
     log = AlignedLog(open_log(recording("motorbench/MultisineTypeA.mat")), ())
     lines = Lines.parse("11:250:1", rate_hz=2500, window=2500)
     asked = Settings(lines=lines, excitation="iq_refx", input="iq_adx", output="theta_mx")
-    assert leading_transient(log, asked) == 1
+    assert steady(log, asked).first == 2500

@@ -92,7 +92,9 @@ class SilenceSearch(StatefulBase):
             self._newest, self._later = float(excitation[-1]), False
             return
         before = before if np.isfinite(before) else excitation[0]
-        silent = (np.diff(excitation, prepend=before) == 0) & np.isfinite(data).all(axis=0)
+        silent = np.diff(excitation, prepend=before) == 0
+        at = np.flatnonzero(silent)
+        silent[at] = np.isfinite(data[:, at]).all(axis=0)
         silent[aside] = False
         self._newest = float(excitation[-1])
         edges = np.flatnonzero(np.diff(np.concatenate([[False], silent, [False]]).astype(np.int8))).reshape(-1, 2)

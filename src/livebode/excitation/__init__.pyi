@@ -1,3 +1,4 @@
+from livebode.excitation._alike import alike as alike
 from livebode.excitation._chirp import Sweep as Sweep
 from livebode.excitation._chirp import chirp as chirp
 from livebode.excitation._chirp import chirp_lines as chirp_lines
@@ -17,6 +18,7 @@ from livebode.excitation._recognise import Excitation as Excitation
 from livebode.excitation._recognise import lines_of_window as lines_of_window
 from livebode.excitation._recognise import recognise as recognise
 from livebode.excitation.blocks import cut as cut
+from livebode.excitation.blocks import spectra as spectra
 from livebode.excitation.low_crest import crest_between_samples as crest_between_samples
 from livebode.excitation.low_crest import low_crest_phases as low_crest_phases
 from livebode.excitation.matrix import MatrixExcitation as MatrixExcitation

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Floats
 from livebode.excitation._medians import medians
+from livebode.kernel import PeriodDrift, period_levels, straight_periods
 
 
 def cut(x: Floats, period: int) -> Floats:
@@ -20,20 +21,22 @@ def cut(x: Floats, period: int) -> Floats:
     count = x.size // period
     blocks = x[: count * period].reshape(count, period)
     typical = medians(blocks, axis=0)
-    level = medians(blocks - typical, axis=1)
-    slope = np.diff(level, append=level[-1]) if count > 1 else np.zeros(1)
-    if count > 1:
-        slope[-1] = slope[-2]
-    before = np.concatenate((slope[:1], slope[:-1]))
-    position = (np.arange(period) + 0.5) / period - 0.5  # position about the middle of the period
-    middle = np.searchsorted(position, 0.0)
-    drift = np.empty_like(blocks)
-    np.multiply.outer(before, position[:middle], out=drift[:, :middle])
-    np.multiply.outer(slope, position[middle:], out=drift[:, middle:])
-    drift += level[:, np.newaxis]
-    np.subtract(blocks, drift, out=drift)
-    drift -= typical.mean()
-    return drift
+    level = period_levels(blocks, typical)
+    return straight_periods(blocks, PeriodDrift(*places(period), level, *slopes(level), float(typical.mean())))
+
+
+def places(period: int) -> tuple[Floats, int]:
+    """Position of each sample about the middle of its period, in periods, and the number of the first one behind it."""
+    position = (np.arange(period) + 0.5) / period - 0.5
+    return position, int(np.searchsorted(position, 0.0))
+
+
+def slopes(level: Floats) -> tuple[Floats, Floats]:
+    """Slopes of the drift through these levels of periods, before the middle of each period and behind it."""
+    behind = np.diff(level, append=level[-1]) if level.size > 1 else np.zeros(1)
+    if level.size > 1:
+        behind[-1] = behind[-2]
+    return np.concatenate((behind[:1], behind[:-1])), behind
 
 
 def spectra(blocks: Floats, bins: slice | NDArray[np.bool_] = slice(None)) -> Complex:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from livebode.arrays import Floats
+from livebode.arrays import Complex, Floats
 
 _PERIODS_MIN = 6
 _REMEMBERED = 16  # periods in the expected one: a drifting clock is followed and does not count as jumps
@@ -17,6 +18,7 @@ _CLEAR = 16.0**2
 _CONFIRMED = 2  # consecutive periods with the same jump
 _ROUNDING = 1e-6  # of a period's energy
 _UNCHANGED = 1e-12  # of a period's energy: a shift by a whole period of all its lines differs only by rounding
+_EQUAL, _CHANGED = 1e-14, 1e-8  # of a period's energy: between equal periods, and by a shift that can be seen there
 _STRANGE, _STRANGE_MAX = 4.0, 3  # times the noise, and periods in a row
 _AGREES = (
     1 / 8
@@ -63,14 +65,28 @@ def find_slips(x: Floats, period: int) -> tuple[Slip, ...]:
 class _Search:
     def __init__(self, blocks: Floats) -> None:
         self._x, self._blocks, self._period = blocks.ravel(), blocks, blocks.shape[1]
-        self._spectra = np.fft.rfft(blocks, axis=1)
-        self._energy, change = _row_energies(blocks), _row_energies(blocks[1:], blocks[:-1])
-        self._noise = float(np.quantile(change, 0.25)) / 2  # of a period: jumps are in fewer than three of four pairs
+
+    @cached_property
+    def _energy(self) -> Floats:
+        return _row_energies(self._blocks)
+
+    @cached_property
+    def _noise(self) -> float:
+        """Energy of the noise of a period: jumps are in fewer than three of four pairs."""
+        return float(np.quantile(_row_energies(self._blocks[1:], self._blocks[:-1]), 0.25)) / 2
+
+    @cached_property
+    def _spectra(self) -> Complex:
+        return np.fft.rfft(self._blocks, axis=1)
 
     def slips(self) -> list[Slip]:
         slips: list[Slip] = []
         index, shift, strange, recent = 0, 0, 0, [self._blocks[0]]
         while (index := index + 1) < len(self._blocks):
+            if not strange and (equal := self._equal(index, np.array(recent[-_REMEMBERED:]), shift)):
+                newest = self._blocks[index + max(equal - _REMEMBERED, 0) : index + equal]
+                recent, index = [*recent[-_REMEMBERED:], *np.roll(newest, shift, axis=1)], index + equal - 1
+                continue
             if not strange and len(recent) >= _REMEMBERED:
                 calm = self._calm(index, np.array(recent[-_REMEMBERED:]), shift)
                 recent, index = [*recent[-_REMEMBERED:], *calm], index + len(calm)
@@ -89,6 +105,25 @@ class _Search:
                 recent.append(here)
                 strange = 0
         return slips
+
+    def _equal(self, index: int, recent: Floats, shift: int) -> int:
+        """The number of next periods that equal the last ones so nearly that none can jump or be strange.
+
+        A period and the expected one differ by the energy d = 4·_EQUAL at most. A shift that changes the period by the
+        energy g agrees with it less by g/2 − √(d·g), which is far above rounding for g ≥ _CHANGED; one that changes
+        nothing, as by half a window of two periods, is not a jump.
+        """
+        known = recent[-1]
+        energy = np.dot(known, known)
+        rows = self._blocks[index : index + _TOGETHER]
+        differ = _row_energies(rows, np.roll(known, -shift)) > _EQUAL * energy
+        if differ[0] or np.any(_row_energies(recent, known) > _EQUAL * energy):
+            return 0
+        own = np.fft.irfft(np.abs(np.fft.rfft(known)) ** 2, self._period)[1:]
+        changes = 2 * (energy - own)
+        if np.any((changes > _UNCHANGED / 2 * energy) & (changes < _CHANGED * energy)):
+            return 0
+        return int(np.argmax(differ)) if differ.any() else len(rows)
 
     def _calm(self, index: int, recent: Floats, shift: int) -> Floats:
         """The next periods, shifted, that have no jump and are not strange: the loop in `slips` for many at a time."""
@@ -141,13 +176,13 @@ class _Search:
         return int(first + np.argmin(np.concatenate(([0.0], np.cumsum(old - new)))))
 
 
-def _row_energies(blocks: Floats, minus: Floats | None = None) -> Floats:
-    """The sum of squares of each row, or of the difference of two; some rows at a time, to need little memory."""
+def _row_energies(blocks: Floats, minus: Floats | float = 0.0) -> Floats:
+    """The sum of squares of each row, less others or one; some rows at a time, to need little memory."""
     energies = np.empty(len(blocks))
+    minus = np.broadcast_to(minus, blocks.shape)
     for first in range(0, len(blocks), _TOGETHER):
         rows = slice(first, first + _TOGETHER)
-        part = blocks[rows] if minus is None else blocks[rows] - minus[rows]
-        energies[rows] = np.sum(part**2, axis=1)
+        energies[rows] = np.sum((blocks[rows] - minus[rows]) ** 2, axis=1)
     return energies
 
 

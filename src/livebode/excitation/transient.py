@@ -8,15 +8,16 @@ from livebode.arrays import Flags, Floats
 from livebode.core import normal_quantile
 from livebode.excitation._medians import medians
 from livebode.excitation.blocks import spectra
+from livebode.kernel import period_reach
 
 FALSE_ALARM = 1e-3  # probability that any period of a recording is marked by chance
 # With fewer periods there is no majority of steady ones.
 _PERIODS_MIN = 3
 # Two periods differ only by rounding below this share of their size.
-_ROUNDING = 1e-9
+ROUNDING = 1e-9
 # A period is marked only from three times the usual distance: noise of a machine is seldom stationary, and a period
 # with twice the usual noise is still useful.
-_FACTOR_MIN = 3.0
+FACTOR_MIN = 3.0
 
 
 def unlike(blocks: Floats, excited: Flags) -> Flags:
@@ -45,12 +46,11 @@ def unlike(blocks: Floats, excited: Flags) -> Flags:
     lines = spectra(blocks, excited)
     real = medians(lines.real, axis=0)
     away = np.abs(lines - real - 1j * medians(lines.imag, axis=0)) ** 2
-    usual = medians(away, axis=0) + (_ROUNDING * np.abs(real)) ** 2
+    usual = medians(away, axis=0) + (ROUNDING * np.abs(real)) ** 2
     usual += np.finfo(np.float64).tiny
     at_lines = np.sqrt(np.mean(away / usual, axis=1))
-    size = np.maximum(blocks.max(axis=1), -blocks.min(axis=1))
-    at_samples = np.max(np.abs(blocks - medians(blocks, axis=0)), axis=1)
-    return _far(at_lines, np.zeros(count)) | _far(at_samples, _ROUNDING * _median(size))
+    at_samples, size = period_reach(blocks, medians(blocks, axis=0))
+    return _far(at_lines, np.zeros(count)) | _far(at_samples, ROUNDING * _median(size))
 
 
 def leading(flags: Flags) -> int:
@@ -64,7 +64,7 @@ def _far(distance: Floats, rounding: float | Floats) -> Flags:
     middle = _median(log)
     spread = _median(np.abs(log - middle)) / normal_quantile(0.75)
     sigmas = -normal_quantile(FALSE_ALARM / len(log))
-    return np.asarray(log > middle + max(sigmas * spread, np.log(_FACTOR_MIN)))
+    return np.asarray(log > middle + max(sigmas * spread, np.log(FACTOR_MIN)))
 
 
 def _median(x: Floats) -> np.float64:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from dataclasses import dataclass
 from typing import Any
 
@@ -105,18 +106,22 @@ class DriftTest(StatefulBase):
         """Process the next responses."""
         single = part.sample - part.first < self._window
         if self._share == 1:
-            self._add_windows(part[single])
-        self._add_gained(part[~single & (part.first == self._begin[0])])
+            self._add_windows(part, np.flatnonzero(single))
+        gained = ~single & (part.first == self._begin[0])
+        if gained.any():
+            self._add_gained(part[gained])
 
-    def _add_windows(self, part: Responses) -> None:
+    def _add_windows(self, part: Responses, single: NDArray[np.intp]) -> None:
+        """Add those of the responses `single`, each of one window, that do not overlap."""
+        first, last = part.first[single].tolist(), part.sample[single].tolist()
         chosen: list[int] = []
-        index = int(np.searchsorted(part.first, self._free))
-        while index < len(part):
+        index = bisect_left(first, self._free)
+        while index < len(first):
             chosen.append(index)
-            self._free = int(part.sample[index]) + 1
-            index = int(np.searchsorted(part.first, self._free))
+            self._free = int(last[index]) + 1
+            index = bisect_left(first, self._free, index)
         if chosen:
-            windows = part[np.array(chosen)]
+            windows = part[single[chosen]]
             if np.isnan(self._begin[0]) and (valid := windows.valid.any(axis=1)).any():
                 self._begin_with(windows[int(np.argmax(valid))])
             weight = np.where(np.isfinite(windows.weight), windows.weight, 1.0)

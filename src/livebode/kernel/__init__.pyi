@@ -51,6 +51,12 @@ from livebode.kernel._matrix import MatrixRows as MatrixRows
 from livebode.kernel._matrix import MatrixStage as MatrixStage
 from livebode.kernel._matrix import MatrixWindows as MatrixWindows
 from livebode.kernel._matrix import process_matrices as process_matrices
+from livebode.kernel._periods import PERIODS_MAX as PERIODS_MAX
+from livebode.kernel._periods import PeriodDrift as PeriodDrift
+from livebode.kernel._periods import period_levels as period_levels
+from livebode.kernel._periods import period_reach as period_reach
+from livebode.kernel._periods import straight_periods as straight_periods
+from livebode.kernel._periods import typical_period as typical_period
 from livebode.kernel._repeating import ADDED as ADDED
 from livebode.kernel._repeating import FORGOTTEN as FORGOTTEN
 from livebode.kernel._repeating import JUDGED as JUDGED

@@ -32,6 +32,27 @@ def process_matrices(
 def largest_sizes(
     samples: npt.NDArray[np.float64], begun: int, window: int, instruction_set: int, out: npt.NDArray[np.float64], /
 ) -> None: ...
+def periods_typical(
+    periods: npt.NDArray[np.float64], instruction_set: int, out: npt.NDArray[np.float64], /
+) -> None: ...
+def periods_levels(
+    periods: npt.NDArray[np.float64],
+    less: npt.NDArray[np.float64] | None,
+    instruction_set: int,
+    out: npt.NDArray[np.float64],
+    /,
+) -> None: ...
+def periods_straighten(
+    periods: npt.NDArray[np.float64], drift: tuple[Any, ...], instruction_set: int, out: npt.NDArray[np.float64], /
+) -> None: ...
+def periods_reach(
+    periods: npt.NDArray[np.float64],
+    typical: npt.NDArray[np.float64],
+    instruction_set: int,
+    far: npt.NDArray[np.float64],
+    size: npt.NDArray[np.float64],
+    /,
+) -> None: ...
 def fit(
     model: tuple[Any, ...],
     frequency_hz: npt.NDArray[np.float64],

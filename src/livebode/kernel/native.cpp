@@ -17,6 +17,7 @@
 #include "native_fit.h"
 #include "native_lines.h"
 #include "native_matrix.h"
+#include "native_periods.h"
 #include "native_repeating.h"
 #include "native_table.h"
 
@@ -361,6 +362,7 @@ NB_MODULE(_native, m)
     m.def("best_instruction_set", [] { return static_cast<int>(lb_best_instruction_set()); });
     bind_lines(m);
     bind_matrix(m);
+    bind_periods(m);
     bind_fit(m);
     bind_repeating(m);
     bind_belt(m);

@@ -1,4 +1,5 @@
 from livebode.preparation._role_spectra import role_spectra as role_spectra
+from livebode.preparation._steady import SteadySearch as SteadySearch
 from livebode.preparation._steady import early_spikes as early_spikes
 from livebode.preparation._steady import steady as steady
 from livebode.preparation._steady import transient_event as transient_event
@@ -38,7 +39,7 @@ from livebode.preparation.plan import window_in_doubt as window_in_doubt
 from livebode.preparation.proposal import Guess as Guess
 from livebode.preparation.proposal import Proposals as Proposals
 from livebode.preparation.quiet import Quiet as Quiet
-from livebode.preparation.quiet import silences as silences
+from livebode.preparation.quiet import SilencesOfRecording as SilencesOfRecording
 from livebode.preparation.recordings import check_same as check_same
 from livebode.preparation.recordings import realisations as realisations
 from livebode.preparation.roles import ROLES as ROLES

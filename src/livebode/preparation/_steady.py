@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.arrays import Flags, Floats
-from livebode.core import Event
+from livebode.arrays import Complex, Flags, Floats
+from livebode.core import Block, Event
 from livebode.estimation import PLACES, Movement, Settings, SpikeGate
-from livebode.excitation import cut, filled, leading, medians, unlike
+from livebode.excitation import alike, cut, filled, leading, medians, spectra, unlike
 from livebode.language import Message
 from livebode.preparation.aligned import AlignedLog
 from livebode.preparation.plan import beginnings
@@ -51,22 +51,17 @@ SHARE_MAX = 1 / 4
 """Of the examined periods: more that differ are not a disturbance, but another state of the machine."""
 
 
-def leading_transient(log: AlignedLog, settings: Settings) -> int:
+def transient_periods(signals: Mapping[str, Floats], settings: Settings) -> int:
     """Periods at the beginning that differ from the steady state in a signal of the estimate, as `inspect` finds them.
 
     0 for a machine that moves, by its schedule, whose periods differ anyway; for fewer than eight periods; and if
     more than a quarter would be excluded.
+
+    Parameters
+    ----------
+    signals
+        By the names of their channels; the first 64 periods count.
     """
-    window = settings.lines.window
-    names = [name for role in ROLES if role in settings.roles and (name := settings.channel(role))]
-    channels = list(dict.fromkeys(names + ([settings.schedule] if settings.schedule else [])))
-    return transient_periods(
-        dict(zip(channels, beginnings(log, channels, min(EXAMINED * window, EXAMINED_SAMPLES_MAX)))), settings
-    )
-
-
-def transient_periods(signals: Mapping[str, Floats], settings: Settings) -> int:
-    """The same in signals by the names of their channels, of which the first 64 periods count."""
     window = settings.lines.window
     size = min(EXAMINED * window, EXAMINED_SAMPLES_MAX)
     found = {name: x[:size] for name, x in signals.items()}
@@ -150,57 +145,19 @@ _AT_END = 2  # periods at the end of a recording that may differ without a retur
 _LISTED_MAX = 1000
 
 
-def outlying_periods(log: AlignedLog, settings: Settings) -> tuple[int, ...]:
-    """Numbers of the periods that differ from those around them in a signal of the estimate, counted from `log.first`.
-
-    Each is compared with the 64 periods around it. A pause of the excitation always differs. Other periods count only
-    if the later ones are as the earlier ones: else they are another state of the machine. None for a machine that
-    moves, by its schedule; for fewer than eight periods; and where more than a quarter differs. Channels that are
-    checked for spikes are left to that check.
-    """
-    window = settings.lines.window
-    names = [name for role in ROLES if role in settings.roles and (name := settings.channel(role))]
-    channels = list(dict.fromkeys(names + ([settings.schedule] if settings.schedule else [])))
-    count = min(EXAMINED, EXAMINED_SAMPLES_MAX // window)
-    found: list[int] = []
-    if count < EXAMINED_MIN:
-        return ()
-    judged = 0
-    for first, rows, last in _stretches(log, channels, window, count):
-        flags = _outlying(dict(zip(channels, rows)), settings, last)
-        # Of a run of periods near the end of a stretch, the next one shows how it ends.
-        stop = len(flags) if last else len(flags) - len(flags) // 4
-        found += [first + int(m) for m in np.flatnonzero(flags[:stop]) if first + m >= judged]
-        judged = first + stop
-    return tuple(found)
-
-
-def _stretches(log: AlignedLog, channels: Sequence[str], window: int, count: int) -> Iterator[tuple[int, Floats, bool]]:
-    """First period, samples, and whether it is the last, of stretches of `count` periods, each half of that later."""
-    held, stop, first = [np.zeros((len(channels), 0))], log.first, 0
-    for block in log.blocks(channels):
-        missing = np.full((len(channels), block.start - stop), np.nan)
-        held, stop = [*held, missing, np.array([block[name] for name in channels])], block.stop
-        while stop - log.first >= (first + count + count // 2) * window:
-            rows = np.concatenate(held, axis=1)
-            yield first, rows[:, : count * window], False
-            held, first = [rows[:, count // 2 * window :]], first + count // 2
-    rows = np.concatenate(held, axis=1)
-    begins = max(rows.shape[1] // window - count, 0)
-    if begins:
-        yield first, rows[:, : count * window], False
-    yield first + begins, rows[:, begins * window : (begins + count) * window], True
-
-
-def _outlying(signals: Mapping[str, Floats], settings: Settings, last: bool) -> Flags:
-    """Which periods of a stretch are left out, shape (periods,)."""
+def _outlying(signals: Mapping[str, Floats], settings: Settings, same: Container[str], last: bool) -> Flags:
+    """Which periods of a stretch are left out, shape (periods,); none differs in the channels `same`."""
     window = settings.lines.window
     count = next(iter(signals.values())).size // window
-    if count < EXAMINED_MIN or (settings.schedule and moves(signals[settings.schedule], window)):
-        return np.zeros(count, dtype=np.bool_)
     names = [name for role in settings.roles if (name := settings.channel(role)) and name not in settings.spikes]
-    strange = np.zeros(count, dtype=np.bool_)
     reference = settings.excitation if settings.method.reference == "excitation" else None
+    names = [name for name in names if name not in same]
+    reference = None if reference in same else reference
+    if count < EXAMINED_MIN or not (names or reference):
+        return np.zeros(count, dtype=np.bool_)
+    if settings.schedule and moves(signals[settings.schedule], window):
+        return np.zeros(count, dtype=np.bool_)
+    strange = np.zeros(count, dtype=np.bool_)
     periods = {
         name: CutPeriods.of(signals[name], window) for name in dict.fromkeys([*names, *filter(None, [reference])])
     }
@@ -259,12 +216,112 @@ class Steady:
     noticed: list[Event]
 
 
+class SteadySearch:
+    """Finds the transient at the beginning of a recording, and its outlying periods, in its Blocks.
+
+    Each period is compared with the 64 periods around it. A pause of the excitation always differs. Other periods count
+    only if the later ones are as the earlier ones: else they are another state of the machine. None is found for a
+    machine that moves, by its schedule; for fewer than eight periods; and where more than a quarter differs. Channels
+    that are checked for spikes are left to that check.
+
+    Parameters
+    ----------
+    settings
+        Lines and signals.
+    first
+        Number of the recording's first sample, from which its periods count.
+    """
+
+    def __init__(self, settings: Settings, first: int) -> None:
+        names = [name for role in ROLES if role in settings.roles and (name := settings.channel(role))]
+        self.channels = list(dict.fromkeys(names + ([settings.schedule] if settings.schedule else [])))
+        self._settings, self._first, self._window = settings, first, settings.lines.window
+        self._together = min(EXAMINED, EXAMINED_SAMPLES_MAX // self._window)
+        self._same = _AlikeChannels(settings, names)
+        self._rows, self._stop = np.zeros((len(self.channels), 0)), first
+        self._begins = 0  # period of the first sample that is held
+        self._transient: int | None = None
+        self._found, self._judged = list[int](), 0
+
+    def process(self, block: Block) -> None:
+        """Judge the stretches of 64 periods that end in this Block, each half of that later."""
+        if self._together < EXAMINED_MIN:
+            return
+        missing = np.full((len(self.channels), block.start - self._stop), np.nan)
+        self._rows = np.concatenate([self._rows, missing, block.data[[block.index(c) for c in self.channels]]], axis=1)
+        self._stop, half = block.stop, self._together // 2
+        while self._rows.shape[1] >= (self._together + half) * self._window:
+            self._judge(self._rows, last=False)
+            self._begins, self._rows = self._begins + half, self._rows[:, half * self._window :]
+
+    def finish(self) -> Steady:
+        """What is steady, at the end of the recording."""
+        begins = max(self._rows.shape[1] // self._window - self._together, 0)
+        if begins:
+            self._judge(self._rows, last=False)
+        self._begins += begins
+        self._judge(self._rows[:, begins * self._window :], last=True)
+        window, first, settings, transient = self._window, self._first, self._settings, self._transient or 0
+        noticed = [replace(transient_event(transient, settings), sample=first)] if transient else []
+        outlying = [m for m in self._found if m >= transient]
+        if outlying:
+            noticed.append(outlying_event(outlying, settings, first))
+        return Steady(first + transient * window, outlying_samples(outlying, window, first), noticed)
+
+    def _judge(self, rows: Floats, *, last: bool) -> None:
+        """Judge the first periods of these samples."""
+        signals = dict(zip(self.channels, rows[:, : self._together * self._window]))
+        same = self._same.names(signals, self._begins)
+        if self._transient is None:
+            whole = dict(zip(self.channels, rows))
+            self._transient = 0 if self._same.all(same) else transient_periods(whole, self._settings)
+        flags = _outlying(signals, self._settings, same, last)
+        # Of a run of periods near the end of a stretch, the next one shows how it ends.
+        stop = len(flags) if last else len(flags) - len(flags) // 4
+        self._found += [m for m in (self._begins + np.flatnonzero(flags[:stop])).tolist() if m >= self._judged]
+        self._judged = self._begins + stop
+
+
+class _AlikeChannels:
+    """Finds channels in which certainly no period of a stretch differs, before all of it is computed."""
+
+    def __init__(self, settings: Settings, names: Sequence[str]) -> None:
+        self._names, self._window, self._bins = names, settings.lines.window, settings.lines.bins
+        self._reference = settings.excitation if settings.method.reference == "excitation" else None
+        self._excited = excited_bins(settings)
+        self._spectra: dict[str, tuple[int, Complex]] = {}
+
+    def all(self, same: Container[str]) -> bool:
+        """Whether these are all channels of the estimate."""
+        return all(name in same for name in self._names)
+
+    def names(self, signals: Mapping[str, Floats], first: int) -> set[str]:
+        """Those in a stretch that begins with this period."""
+        return {name for name in self._names if self._alike(name, signals[name], first)}
+
+    def _alike(self, name: str, x: Floats, first: int) -> bool:
+        periods = x[: x.size // self._window * self._window].reshape(-1, self._window)
+        if len(periods) < EXAMINED_MIN:
+            return False
+        if np.array_equal(periods[0], periods[1]) and np.all(periods == periods[0]):
+            return True
+        if name == self._reference:  # it may pause, too
+            return False
+        with np.errstate(all="ignore"):
+            return alike(periods, lambda: self._lines(name, periods, first), self._bins)
+
+    def _lines(self, name: str, periods: Floats, first: int) -> Complex:
+        """Spectra at the lines, of which a part is known from the previous stretch."""
+        begun, known = self._spectra.get(name, (first, np.zeros((0, len(self._bins)), dtype=np.complex128)))
+        known = known[first - begun :]
+        found = np.concatenate([known, spectra(periods[len(known) :], self._excited)])
+        self._spectra[name] = first, found
+        return found
+
+
 def steady(source: AlignedLog, settings: Settings) -> Steady:
     """What is steady in a recording, whose periods count from `source.first`."""
-    window, begins, noticed = settings.lines.window, source.first, []
-    if transient := leading_transient(source, settings):
-        noticed.append(replace(transient_event(transient, settings), sample=begins))
-    outlying = [m for m in outlying_periods(source, settings) if m >= transient]
-    if outlying:
-        noticed.append(outlying_event(outlying, settings, begins))
-    return Steady(begins + transient * window, outlying_samples(outlying, window, begins), noticed)
+    search = SteadySearch(settings, source.first)
+    for block in source.blocks(search.channels):
+        search.process(block)
+    return search.finish()

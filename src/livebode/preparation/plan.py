@@ -31,7 +31,8 @@ def window_doubt(samples: np.ndarray, settings: Settings) -> list[Event]:
     lags = range(max(1, window - _LAGS), window + _LAGS + 1)
     if samples.size < window + _LAGS + window // 2:
         return []
-    differences = {lag: _difference(samples, lag, window + _LAGS) for lag in lags}
+    power = float(np.nanvar(samples))
+    differences = {lag: _difference(samples, lag, window + _LAGS, power) for lag in lags}
     best = min(differences, key=lambda lag: (differences[lag], abs(lag - window)))
     if differences[window] <= _ROUNDING or differences[best] >= differences[window] / 2:
         return []
@@ -46,7 +47,8 @@ def divided_window(samples: np.ndarray, settings: Settings) -> list[Event]:
     longest = max(window, period)
     if window % period == 0 or samples.size <= longest:
         return []
-    changes, rest = (_difference(samples, lag, longest) / 2 for lag in (window, period))
+    power = float(np.nanvar(samples))
+    changes, rest = (_difference(samples, lag, longest, power) / 2 for lag in (window, period))
     return [_doubt(settings, period, changes, rest)]
 
 
@@ -66,12 +68,11 @@ def _doubt(settings: Settings, period: int, changes: float, rest: float) -> Even
     return Event("window-doubtful", 0, 0.0, message, facts)
 
 
-def _difference(samples: np.ndarray, lag: int, ahead: int) -> float:
-    """Mean square of x(n + lag) − x(n) over that of x, over as many samples for every lag up to `ahead`."""
+def _difference(samples: np.ndarray, lag: int, ahead: int, power: float) -> float:
+    """Mean square of x(n + lag) − x(n) over the power of x, over as many samples for every lag up to `ahead`."""
     n = samples.size - ahead
     rest = samples[lag : lag + n] - samples[:n]
     rest = rest[np.isfinite(rest)]
-    power = float(np.nanvar(samples))
     return float(np.dot(rest, rest)) / (rest.size * power) if rest.size and power > 0 else 0.0
 
 

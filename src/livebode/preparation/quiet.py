@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from livebode.core import Lines, SignalError
+from livebode.core import Block, Lines, SignalError
 from livebode.estimation import (
     SECONDS_MIN,
     Hum,
@@ -19,7 +19,6 @@ from livebode.estimation import (
     find_hum,
     may_disturb,
 )
-from livebode.preparation.aligned import AlignedLog
 from livebode.preparation.plan import beginnings
 from livebode.sources import Log
 
@@ -96,24 +95,39 @@ def look_for_hum(log: Log, signals: Sequence[str], excitation: str | None, lines
     return Quiet(lines, log.first + first, stop - first, list(zip(found, near)), units, constant)
 
 
-def silences(source: AlignedLog, settings: Settings) -> list[SilentStretch]:
+class SilencesOfRecording:
     """The stretches of a recording in which the excitation does not change for two seconds or more, with their tones.
 
     None where no tone of the mains can disturb a line.
+
+    Parameters
+    ----------
+    settings
+        Lines and signals.
+    first
+        Number of the recording's first sample.
     """
-    lines, excitation = settings.lines, settings.excitation or settings.channel(settings.method.reference) or ""
-    if not may_disturb(lines):
-        return []
-    names = list(dict.fromkeys(name for role in settings.roles if (name := settings.channel(role))))
-    search = SilenceSearch(len(names), lines.rate_hz, (_SAMPLES_MAX,))
-    found, stop = list[SilentStretch](), source.first
-    for block in source.blocks(list(dict.fromkeys([*names, excitation]))):
-        if block.gap or block.start != stop:
-            found += search.interrupt()
-        signals = np.array([block[name] for name in names])
-        found += search.process(signals, block[excitation], block.start, np.zeros(0, dtype=np.intp))
-        stop = block.stop
-    return found + list(search.interrupt())
+
+    def __init__(self, settings: Settings, first: int) -> None:
+        self._excitation = settings.excitation or settings.channel(settings.method.reference) or ""
+        self._signals = list(dict.fromkeys(name for role in settings.roles if (name := settings.channel(role))))
+        self._search = SilenceSearch(len(self._signals), settings.lines.rate_hz, (_SAMPLES_MAX,))
+        self._found, self._stop = list[SilentStretch](), first
+        self.channels = list(dict.fromkeys([*self._signals, self._excitation])) if may_disturb(settings.lines) else []
+
+    def process(self, block: Block) -> None:
+        """Search the next samples of `channels`."""
+        if not self.channels:
+            return
+        if block.gap or block.start != self._stop:
+            self._found += self._search.interrupt()
+        signals = block.data[[block.index(name) for name in self._signals]]
+        self._found += self._search.process(signals, block[self._excitation], block.start, np.zeros(0, dtype=np.intp))
+        self._stop = block.stop
+
+    def finish(self) -> list[SilentStretch]:
+        """The stretches, at the end of the recording."""
+        return self._found + list(self._search.interrupt())
 
 
 def _longest(flags: np.ndarray) -> tuple[int, int]:

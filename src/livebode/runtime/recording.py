@@ -15,16 +15,16 @@ from livebode.locations import Location, local_copy
 from livebode.preparation import (
     AlignedLog,
     ChannelCheck,
+    SilencesOfRecording,
+    SteadySearch,
     configured_part,
     early_spikes,
     hop_event,
     make_follower,
     make_settings,
     roles_in_doubt,
-    silences,
     slip_event,
     slips_of,
-    steady,
     window_in_doubt,
 )
 from livebode.records import content_sha256
@@ -80,13 +80,19 @@ def examined(axis: Axis, log: Log, follower: Follower, shift: int = 0) -> Examin
     if slips:
         noticed.append(slip_event(slips, settings))
     source = whole = AlignedLog(log, slips, log.first)
+    periods = silences = None
     if settings.periodic and not axis.tracking.all_periods and axis.motion is None:
-        kept = steady(source, settings)
+        periods = SteadySearch(settings, whole.first)
+    if isinstance(follower, Tracker):
+        silences = SilencesOfRecording(settings, whole.first)
+    _search(whole, [search for search in (periods, silences) if search is not None])
+    if periods is not None:
+        kept = periods.finish()
         source, noticed = replace(source, first=kept.first), noticed + kept.noticed
         if kept.left_out.size and isinstance(follower, Tracker):
             follower.leave_out(kept.left_out + shift)
-    if isinstance(follower, Tracker):
-        spans = hum_spans(silences(whole, settings), settings.lines, average=settings.average)
+    if silences is not None and isinstance(follower, Tracker):
+        spans = hum_spans(silences.finish(), settings.lines, average=settings.average)
         noticed += hum_events(spans, settings.lines, source.first)
         follower.know_hum([span.shifted(shift) for span in spans])
         follower.know_spikes(early_spikes(source, settings) + shift)
@@ -95,6 +101,14 @@ def examined(axis: Axis, log: Log, follower: Follower, shift: int = 0) -> Examin
     if log.is_part:
         found["part"] = {"first": log.first, "stop": log.stop}
     return Examined(source, noticed, found)
+
+
+def _search(source: AlignedLog, searches: Sequence[SteadySearch | SilencesOfRecording]) -> None:
+    """Give the whole of a recording to these searches."""
+    channels = list(dict.fromkeys(name for search in searches for name in search.channels))
+    for block in source.blocks(channels) if channels else ():
+        for search in searches:
+            search.process(block)
 
 
 @dataclass(frozen=True, eq=False)

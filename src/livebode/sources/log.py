@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from livebode.core import Block, Channel, ClockKind, LivebodeError, RecordingError, UsageError
 from livebode.locations import Location
 from livebode.sources.expressions import Expression, computed_blocks
+from livebode.sources.held_chunks import HeldChunks
 from livebode.sources.naming import explained, found_channel, resolve
 from livebode.sources.quantities import DeclaredQuantities, in_si
 from livebode.sources.recording import Chunk, Column, Recording, Skipped, guarded, located, stacked
@@ -60,6 +61,7 @@ class Log:
         self._clock = clock
         self._block_samples = block_samples
         self._quantities: DeclaredQuantities | None = quantities
+        self._held = HeldChunks()
         self.first = 0
         """Number of the first sample that `blocks` reads."""
         self._stop: int | None = None
@@ -356,7 +358,10 @@ class Log:
         return self._quantities.channel(name, column.unit, column.name)
 
     def _read(self, columns: Sequence[Column], rows: int) -> Iterator[Chunk]:
-        return guarded(self._recording.chunks(columns, rows), self._recording.path, self._recording.format)
+        recording = self._recording
+        return self._held.chunks(
+            columns, lambda: guarded(recording.chunks(columns, rows), recording.path, recording.format)
+        )
 
     def _cut(self, chunks: Iterator[Chunk], labels: tuple[Channel, ...], limit: int) -> Iterator[Block]:
         clock = self._clock
