@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-from dataclasses import dataclass
 from math import inf
 from typing import TYPE_CHECKING
 
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 
 from livebode import fitting
 from livebode.core import PlantKinds, Response, Responses
+from livebode.dataclass import dataclass
 from livebode.estimation import Movement
 from livebode.language import Message
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,7 @@ from livebode.analysis.margin_reading import margins
 from livebode.analysis.open_loop import OpenLoop
 from livebode.configuration import LoopSection, without_null
 from livebode.core import FitError, Loop, Parameters, Responses
+from livebode.dataclass import dataclass
 from livebode.fitting import Fit, Fitter, mean_response
 from livebode.language import Message
 from livebode.records import read_loop_check

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,7 @@ from livebode.core import (
     counted,
     half_width,
 )
+from livebode.dataclass import dataclass
 from livebode.language import Message
 
 MARGIN_WORDS = {

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Floats
 from livebode.core import FitError, Loop, Model
+from livebode.dataclass import dataclass
 from livebode.fitting import EvaluationGrid, Hold, PhysicalModel, described
 from livebode.kernel import FeedbackSeries, FitModel, MarginGrid
 

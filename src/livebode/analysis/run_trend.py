@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from math import isfinite
 from typing import Any
 
@@ -12,6 +12,7 @@ import numpy as np
 
 from livebode.arrays import Floats
 from livebode.core import INTERVAL_FACTOR, OK, Event
+from livebode.dataclass import dataclass
 from livebode.records import RunRecord
 from livebode.tables import Table
 

@@ -6,11 +6,11 @@ import errno
 import sys
 import traceback
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from livebode.core import LivebodeError, UsageError, not_written, plural
+from livebode.dataclass import dataclass
 from livebode.plugins import GROUPS, Plugin, plugins
 
 _OPTIONS_BY_CODE = {"output.exists": ("out", "force")}

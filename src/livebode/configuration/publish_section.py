@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from string import Formatter
 from typing import Annotated, Literal
@@ -11,6 +10,7 @@ from urllib.parse import urlsplit
 
 from livebode.configuration.section import ConfigurationSection, File
 from livebode.core import ConfigError, Field, ValueCheck, nearest_name
+from livebode.dataclass import dataclass
 from livebode.plugins import named
 
 NAMES = ("axis", "machine", "run", "kind", "priority", "message", "time", "sample", "value", "unit")

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import Block, ConfigError
+from livebode.dataclass import dataclass
 
 _EXACT_MAX = 2.0**53
 

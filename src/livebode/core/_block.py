@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from math import inf
 from typing import TYPE_CHECKING, TypeVar
 
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from livebode.core._unit_reading import KINDS, QuantityKind, read_unit, split_plant_unit
 from livebode.core.errors import SignalError, UsageError
+from livebode.dataclass import dataclass
 
 if TYPE_CHECKING:
     from livebode.core._response import Response, Responses

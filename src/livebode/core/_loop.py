@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -12,6 +11,7 @@ from numpy.typing import ArrayLike
 from livebode.arrays import Complex
 from livebode.core.errors import UsageError
 from livebode.core.model import Model, as_model
+from livebode.dataclass import dataclass
 
 Logged = Literal["before", "after"]
 Controllers = Sequence[Sequence[object]]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from livebode.core.distributions import CIRCLE_FACTOR
 from livebode.core.errors import GridError, UsageError
 from livebode.core.lines import Lines, ends, position, within
 from livebode.core.rows import RowArrays
+from livebode.dataclass import dataclass
 from livebode.language import Message
 from livebode.plugins import loaded
 

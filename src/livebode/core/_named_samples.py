@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from livebode.arrays import Floats
 from livebode.core.errors import UsageError
+from livebode.dataclass import dataclass
 
 _MOMENTS = "mM"
 _NANOSECONDS_PER_S = 1_000_000_000

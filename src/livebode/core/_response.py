@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
@@ -16,6 +15,7 @@ from livebode.core.distributions import CIRCLE_FACTOR, COVERAGE
 from livebode.core.errors import GridError
 from livebode.core.lines import Lines, ends
 from livebode.core.rows import RowArrays
+from livebode.dataclass import dataclass
 from livebode.plugins import loaded
 
 if TYPE_CHECKING:

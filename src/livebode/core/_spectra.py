@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from livebode.core._block import Block, Channel
 from livebode.core.errors import GridError, UsageError
 from livebode.core.lines import WINDOW_MAX, Lines
+from livebode.dataclass import dataclass
 
 NOT_WHOLE, SPIKE, LEFT_OUT = 1, 2, 4
 """Bits of a window's state: it contains a start, a gap or a non-finite sample; a spike; samples that a run leaves out.

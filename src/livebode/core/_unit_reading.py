@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
 from math import inf, pi
 from typing import Literal, get_args
+
+from livebode.dataclass import dataclass
 
 QuantityKind = Literal["torque", "force", "current", "velocity", "position", "acceleration", "other"]
 KINDS: tuple[QuantityKind, ...] = get_args(QuantityKind)

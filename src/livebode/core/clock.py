@@ -6,11 +6,12 @@ from bisect import bisect_right
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass, field
+from dataclasses import field
 from datetime import UTC, datetime
 from math import isfinite, nan
 from typing import Any, Literal
 
+from livebode.dataclass import dataclass
 from livebode.language import Moment, date
 
 ClockKind = Literal["utc", "relative"]

@@ -6,7 +6,6 @@ response.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import inf
 from typing import Literal
 
@@ -15,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from livebode.core.errors import UsageError
 from livebode.core.model import Algebra
+from livebode.dataclass import dataclass
 
 Rule = Literal["backward", "forward", "trapezoidal", "continuous"]
 Hold = Literal["zero-order", "none"]

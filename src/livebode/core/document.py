@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from datetime import UTC, datetime
 from typing import Any, Literal
 
 from livebode.core.errors.inputs import ExtraError
+from livebode.dataclass import dataclass
 from livebode.language import Message
 from livebode.plugins import loaded, named
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from fractions import Fraction
 from math import ceil, floor, gcd, lcm
 from sys import float_info
@@ -11,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from livebode.core.errors import GridError, UsageError
+from livebode.dataclass import dataclass
 
 # A line that a person typed counts as on the grid when it is this close to a bin, in bins: the window then contains a
 # whole number of periods to a millionth, and the leakage is below every other error.

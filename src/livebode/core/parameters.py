@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, overload
 
 import numpy as np
@@ -14,6 +14,7 @@ from livebode.core._wording import counted
 from livebode.core.distributions import COVERAGE, normal_quantile
 from livebode.core.errors import UsageError
 from livebode.core.rows import RowArrays
+from livebode.dataclass import dataclass
 
 OK = "ok"
 """The status of a valid row; any other status is the reason why the row contains NaN."""

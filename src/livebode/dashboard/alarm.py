@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, field, replace
 from math import isfinite
 from typing import Any, Literal
 
 from livebode.core import Event
+from livebode.dataclass import dataclass
 from livebode.language import for_page
 from livebode.monitoring import AlarmKind
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any, Literal
 
 from livebode.core import Event, ServerError, UsageError
 from livebode.dashboard.alarm import AlarmShelf
 from livebode.dashboard.notices import ACKNOWLEDGED, SHELVED, UNSHELVED, Notice
 from livebode.dashboard.queries import check_letters, json_object, whole_number
+from livebode.dataclass import dataclass
 from livebode.language import Message, Moment
 
 Act = Literal["acknowledge", "shelve", "unshelve"]

@@ -6,7 +6,7 @@ import asyncio
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, field
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 from livebode.core import Event, LivebodeError, RunClock, ServerError
@@ -17,6 +17,7 @@ from livebode.dashboard.notices import Notice
 from livebode.dashboard.places import Places
 from livebode.dashboard.run_feed import RunFeed
 from livebode.dashboard.state import State
+from livebode.dataclass import dataclass
 from livebode.language import Message, for_page
 from livebode.monitoring import PRIORITIES, SOURCE
 

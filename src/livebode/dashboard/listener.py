@@ -10,7 +10,6 @@ import ssl
 import sys
 from collections import Counter, deque
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import h11
@@ -19,6 +18,7 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from livebode.dashboard.access import network
 from livebode.dashboard.guard import EXPECT_UPLOAD
+from livebode.dataclass import dataclass
 
 REQUEST_S = 10.0
 """Limit for a complete request, head and body, from the connection or its first byte; of an upload for each part."""

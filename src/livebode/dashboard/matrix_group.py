@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from math import inf
 from pathlib import Path
 from typing import Any
@@ -13,6 +13,7 @@ import numpy as np
 from livebode.analysis import LIVE_VALUES_MAX, Overview
 from livebode.core import MatrixResponses, ServerError
 from livebode.dashboard.hub import Hub
+from livebode.dataclass import dataclass
 from livebode.records import RunRecord, entry_summary
 from livebode.runtime import Document, RunEnded, RunStarted
 

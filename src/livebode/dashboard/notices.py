@@ -6,7 +6,7 @@ import hashlib
 import time
 from collections import OrderedDict, deque
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 from livebode.core import Event
@@ -21,6 +21,7 @@ from livebode.dashboard.alarm import (
     number_in,
     text_in,
 )
+from livebode.dataclass import dataclass
 from livebode.language import for_page
 from livebode.monitoring import ALARMS, FAR, PRIORITIES, RETURNS, SOURCE, UNMONITORED, cause_of
 from livebode.records import each_event, event_counts, group_of

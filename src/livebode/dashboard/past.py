@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +11,7 @@ import numpy as np
 from livebode.analysis import Overview
 from livebode.core import Responses, ServerError
 from livebode.dashboard.state import State
+from livebode.dataclass import dataclass
 from livebode.language import Message
 from livebode.records import RunRecord, thinned
 

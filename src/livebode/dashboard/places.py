@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass
 
 from livebode.dashboard.access import Role, network
+from livebode.dataclass import dataclass
 
 PLACES = 16
 """Largest number of browsers at the same time."""

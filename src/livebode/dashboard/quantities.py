@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 from math import log10
 from typing import Any, get_args
@@ -24,6 +24,7 @@ from livebode.core import (
     SourceUnit,
     split_plant_unit,
 )
+from livebode.dataclass import dataclass
 from livebode.estimation import convert
 from livebode.language import Message
 from livebode.records import kinds_in, lines_in, source_unit_in

@@ -6,13 +6,13 @@ import json
 import math
 import unicodedata
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any, cast, get_args
 
 from livebode.core import Quantity, ServerError, UsageError
 from livebode.dashboard.frames import REFERENCES_MAX
 from livebode.dashboard.quantities import QUANTITIES
 from livebode.dashboard.signal_answer import Picture
+from livebode.dataclass import dataclass
 from livebode.language import Message
 from livebode.records import TEXT_MAX
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import nan
 from typing import Any
 
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Floats
 from livebode.core import Parameters, Responses, RowArrays
+from livebode.dataclass import dataclass
 
 ROWS_MAX = 2400
 EVERY_S = 0.05

@@ -6,13 +6,14 @@ import os
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 from livebode.analysis import alarms_of, fitted_rows, trend_points
 from livebode.core import LivebodeError, RunClock, ServerError
 from livebode.dashboard.run_entry import RunEntry, entry
+from livebode.dataclass import dataclass
 from livebode.language import Message, for_page
 from livebode.records import RunRecord, is_run
 

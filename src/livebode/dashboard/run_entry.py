@@ -6,13 +6,14 @@ import os
 import stat
 import time
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, field
 from math import isfinite, nan
 from pathlib import Path
 from typing import Any, Literal
 
 from livebode.core import LEVELS, LivebodeError, RunClock
 from livebode.dashboard.alarm import limited
+from livebode.dataclass import dataclass
 from livebode.language import for_page, recorded
 from livebode.monitoring import result_tone
 from livebode.records import COPY, RUN, Manifest, read_notes, read_summary, what_is_wrong

@@ -9,7 +9,7 @@ import os
 from collections import OrderedDict
 from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import asynccontextmanager
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +26,7 @@ from livebode.dashboard.guard import body
 from livebode.dashboard.queries import json_object
 from livebode.dashboard.run_catalogue import RunCatalogue, details
 from livebode.dashboard.run_feed import views_of
+from livebode.dataclass import dataclass
 from livebode.language import Message, negotiated
 from livebode.records import Notes, delete, summary_path, to_json, write_notes
 

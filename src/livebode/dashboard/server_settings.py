@@ -6,11 +6,11 @@ import ipaddress
 import os
 import shlex
 import stat
-from dataclasses import dataclass
 from pathlib import Path
 
 from livebode.configuration import ServeSection
 from livebode.core import ConfigError
+from livebode.dataclass import dataclass
 from livebode.sources.live import secret
 
 TOKEN_LETTERS_MIN = 32

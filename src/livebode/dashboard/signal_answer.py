@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import Any, Literal
 
 import numpy as np
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from livebode.core import Block, Channel, Lines
 from livebode.dashboard.signal_tap import WINDOWS
+from livebode.dataclass import dataclass
 from livebode.records import to_json
 
 HANN_BANDWIDTH_BINS = 1.5

@@ -6,12 +6,12 @@ import math
 import threading
 import time
 from collections import deque
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import Block, Channel, Spectra
+from livebode.dataclass import dataclass
 
 WATCHED_S = 2.0
 """Samples are retained for this long after the last request."""

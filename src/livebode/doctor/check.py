@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, field
 from typing import Any, Literal, get_args
 
 from livebode.core import LivebodeError
+from livebode.dataclass import dataclass
 
 Verdict = Literal["not applicable", "ok", "warning", "failed"]
 """From the least to the most urgent."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,7 @@ from livebode.configuration import (
     recorded_configuration,
 )
 from livebode.core import ConfigError, LivebodeError, UsageError
+from livebode.dataclass import dataclass
 from livebode.estimates import rule
 from livebode.plugins import loaded
 from livebode.preparation import live_follower

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 from math import gcd
 from statistics import NormalDist
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Floats
 from livebode.core import MAINS_HZ, Lines, SignalError, Stage, StatefulBase
+from livebode.dataclass import dataclass
 
 _ON_BIN = 0.1  # bins: a tone this close to a bin has nearly all its power there
 HARMONICS = 10

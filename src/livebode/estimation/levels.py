@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import gcd
 from typing import Any
 
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Floats
 from livebode.core import INTERVAL_FACTOR, Lines, Stage, StatefulBase, f_quantile, meets_mains
+from livebode.dataclass import dataclass
 from livebode.estimation.detection import Interpolation
 from livebode.estimation.products import power
 from livebode.estimation.spectra import after

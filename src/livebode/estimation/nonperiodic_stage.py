@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Floats
 from livebode.core import Channel, Responses, Stage, StatefulBase
+from livebode.dataclass import dataclass
 from livebode.estimation.line_stage import response_unit
 from livebode.estimation.quantities import from_plant
 from livebode.estimation.quotient import LocalPolynomial, Quotient, WelchAverage

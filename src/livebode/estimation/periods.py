@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import lru_cache
 from math import ceil, log
 from typing import ClassVar
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Floats
 from livebode.core import Stage, StatefulBase
+from livebode.dataclass import dataclass
 from livebode.kernel import MEANS, SCATTER, LineMoments, WeightSums
 
 _TOGETHER = 1 << 15  # samples of a signal in one batch: a few of such signals, and their spectra, stay in the cache

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from livebode.arrays import Complex, Flags, Floats
 from livebode.core import Loop, Quantity
+from livebode.dataclass import dataclass
 from livebode.estimation.tracker_settings import Settings
 from livebode.kernel import LineRows
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from livebode.arrays import Complex, Floats
 from livebode.core import Lines, Stage, StatefulBase, UsageError
+from livebode.dataclass import dataclass
 from livebode.estimation.tracker_settings import WINDOWS
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Flags, Floats
 from livebode.core import Block, Event, Lines, QuantityKind, Stage, step_of
+from livebode.dataclass import dataclass
 from livebode.estimation.hum import SilentHum, may_disturb
 from livebode.estimation.levels import DistortionLevels
 from livebode.estimation.movement import PLACES, Movement

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from livebode.arrays import Floats
 from livebode.core import Lines, Stage, StatefulBase, UsageError
+from livebode.dataclass import dataclass
 
 _MORE = 1.3  # times the amplitude: its error has a fixed size, unlike noise, and the 63 % bound must cover it
 

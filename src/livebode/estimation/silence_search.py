@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Floats
 from livebode.core import Lines, Stage, StatefulBase
+from livebode.dataclass import dataclass
 from livebode.estimation.hum import GONE, SECONDS_MIN, Hum, disturbed_lines, find_hum
 
 _VALUES_MAX = 1 << 15  # of a stretch in a state: 256 kB, 16 s of two signals at 1 kHz

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from math import isqrt
 from typing import Literal
 
 from livebode.core import Lines, Loop, Quantity, UsageError
+from livebode.dataclass import dataclass
 from livebode.estimation.ripple import RippleOrder
 
 Role = Literal["excitation", "input", "output"]

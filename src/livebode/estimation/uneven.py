@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Floats
 from livebode.core import Stage
+from livebode.dataclass import dataclass
 from livebode.estimation.spectra_tracker import SpectraTracker
 
 _ONE, _X, _U, _UU, _XU = range(5)  # rows of the sums; the last three for a trend

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
 from math import gcd
 
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Flags, Floats
 from livebode.core import Lines, QuantityKind, f_quantile
+from livebode.dataclass import dataclass
 from livebode.estimation.detection import Groups, Interpolation
 from livebode.estimation.hum import Neighbours, mains_of
 from livebode.estimation.periods import Moments

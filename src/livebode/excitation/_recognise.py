@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from livebode.arrays import Flags, Floats
 from livebode.core import Lines, SignalError, UsageError, step_of
+from livebode.dataclass import dataclass
 from livebode.excitation._extent import extent
 from livebode.excitation.blocks import cut, spectra
 from livebode.excitation.doubtful import refuse_if_doubtful, with_lines_beside, without_junk

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from livebode.arrays import Complex, Floats
 from livebode.core import Lines, MatrixLoop, UsageError
+from livebode.dataclass import dataclass
 from livebode.excitation._multisine import Phases, each, multisine
 
 Plant = Callable[[Floats], Complex]

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Flags, Floats
+from livebode.dataclass import dataclass
 from livebode.excitation.blocks import grouped
 
 FALSE_ALARM = 1e-3  # probability that any bin of a recording is classified as a line by chance, all bins together

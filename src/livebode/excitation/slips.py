@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from livebode.arrays import Complex, Floats
+from livebode.dataclass import dataclass
 
 _PERIODS_MIN = 6
 _REMEMBERED = 16  # periods in the expected one: a drifting clock is followed and does not count as jumps

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Any
 
 import numpy as np
 
 from livebode.arrays import Complex, Floats
 from livebode.core import DesignError, Lines, UsageError
+from livebode.dataclass import dataclass
 from livebode.excitation._quantised import quantised
 
 _CHANGED_MAX = 0.5  # of a line's amplitude: beyond it, rounding dominates the line

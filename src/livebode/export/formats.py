@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, TypeVar
 
 from livebode.core import OutputError, whole_file, writing
+from livebode.dataclass import dataclass
 from livebode.plugins import named
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +10,7 @@ import numpy as np
 
 from livebode.arrays import Floats
 from livebode.core import Parameters, UsageError, needing
+from livebode.dataclass import dataclass
 from livebode.export.matlab import VARIABLE
 from livebode.export.result import WriteResult
 

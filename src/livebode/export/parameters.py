@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from livebode.core import OutputError, RecordError, needing
+from livebode.dataclass import dataclass
 from livebode.export.delimited import write_columns, write_header
 from livebode.export.matlab import VARIABLE
 from livebode.export.result import VALUES_MAX, WriteResult

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Floats
 from livebode.core import Responses
+from livebode.dataclass import dataclass
 
 Starts = NDArray[np.int64]
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from math import pi
 from typing import Any, Literal
 
@@ -11,6 +10,7 @@ import numpy as np
 
 from livebode.arrays import Complex, Floats
 from livebode.core import UsageError
+from livebode.dataclass import dataclass
 from livebode.fitting.modal import QUALITY, chain_of, scan
 from livebode.fitting.physical import EvaluationGrid, Parameter, PhysicalModel, delay, free_friction, plus, times
 from livebode.language import Message

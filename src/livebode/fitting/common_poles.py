@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from livebode.arrays import Complex, Floats
 from livebode.core import COVERAGE, OK, FitError, GridError, Parameters, Response, Responses, UsageError, counted
+from livebode.dataclass import dataclass
 from livebode.fitting.fitter import measured_of
 from livebode.fitting.mean import mean_response
 from livebode.fitting.partial_fractions import PartialFractions, PoleQuantities

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Set
-from dataclasses import dataclass
 from math import inf
 from typing import Any
 
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Floats
 from livebode.core import OK
+from livebode.dataclass import dataclass
 from livebode.fitting.physical import DELAY, EvaluationGrid, Parameter, PhysicalModel, plus, times
 from livebode.fitting.problem import MeasuredRows, Problem
 from livebode.fitting.rows import FittedRows, fit_rows

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from bisect import bisect_left
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Flags, Floats
 from livebode.core import Lines, Response, Responses, Stage, StatefulBase, sum_exceeded
+from livebode.dataclass import dataclass
 
 FALSE_ALARM = 0.01
 """Probability that a record of a machine that does not drift is reported, all lines together."""

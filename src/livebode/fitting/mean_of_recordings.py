@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Flags, Floats
 from livebode.core import Response, Responses, SignalError, f_exceeded, sum_exceeded
+from livebode.dataclass import dataclass
 from livebode.fitting.mean import RunningMean
 
 BY_CHANCE = 0.01

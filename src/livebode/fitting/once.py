@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from livebode.core import COVERAGE, FitError, Parameters, Response, Responses, not_installed, with_bound
+from livebode.dataclass import dataclass
 from livebode.fitting.competitors import WORDS, AllowedChanges, Competitor, compete, competitor, mixed, positive
 from livebode.fitting.fitter import Fitter
 from livebode.fitting.mean import mean_response

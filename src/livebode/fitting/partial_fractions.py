@@ -4,12 +4,12 @@ reads from it: frequencies, dampings, residues, gains and delays.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import pi
 
 import numpy as np
 
 from livebode.arrays import Complex, Floats
+from livebode.dataclass import dataclass
 from livebode.fitting.physical import EvaluationGrid
 from livebode.fitting.transfer import Transfer, roots
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from math import inf, isfinite
 from typing import Any, ClassVar, Literal, NamedTuple
@@ -13,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from livebode.arrays import Complex, Floats
 from livebode.core import Lines, UsageError
+from livebode.dataclass import dataclass
 from livebode.fitting.transfer import Transfer, roots
 
 

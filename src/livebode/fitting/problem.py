@@ -7,7 +7,6 @@ The fit in C solves the problem where its model has a description for it.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -15,6 +14,7 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Floats
 from livebode.core import RowArrays, UsageError, nearest_name
+from livebode.dataclass import dataclass
 from livebode.fitting.chains import Chain, Rigid, TwoMass, TwoMassGain
 from livebode.fitting.least_squares import Minimum, minimise
 from livebode.fitting.physical import EvaluationGrid, PhysicalModel

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -10,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from livebode.arrays import Complex, Floats
 from livebode.core import OK, FitError, Parameters, Response, Responses, UsageError, not_installed
+from livebode.dataclass import dataclass
 from livebode.fitting.fitter import measured_of
 from livebode.fitting.problem import MeasuredRows
 from livebode.fitting.rows import NO_RESPONSE, NOT_SEEN

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -10,6 +9,7 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Floats
 from livebode.core import needing
+from livebode.dataclass import dataclass
 from livebode.fitting.partial_fractions import PartialFractions, Structure
 from livebode.fitting.physical import EvaluationGrid
 from livebode.fitting.problem import MeasuredRows, Solution

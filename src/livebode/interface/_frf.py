@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal, get_args, overload
 
@@ -24,6 +24,7 @@ from livebode.core import (
     counted,
     series_of,
 )
+from livebode.dataclass import dataclass
 from livebode.estimation import response_unit, welch
 from livebode.fitting import RunningMean
 from livebode.preparation import follower_of, make_settings, suitable_estimator

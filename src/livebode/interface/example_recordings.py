@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 from importlib import resources
 from importlib.util import find_spec
 from pathlib import Path
@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from livebode.core import Block, Lines, OutputError, remove_empty, whole_directory, whole_files, writing
+from livebode.dataclass import dataclass
 from livebode.excitation import chirp, multisine
 from livebode.export import write_columns, write_header
 from livebode.plugins import named

@@ -7,13 +7,14 @@ import string
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass, field
+from dataclasses import field
 from datetime import datetime
 from functools import cache
 from importlib.resources import files
 from numbers import Real
 from typing import Any
 
+from livebode.dataclass import dataclass
 from livebode.language.quantity_names import QUANTITY_NAMES
 
 _PLURAL_PERIOD = 100

@@ -5,9 +5,9 @@ from __future__ import annotations
 import glob
 import os
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 
+from livebode.dataclass import dataclass
 from livebode.locations.copies import version
 from livebode.locations.storage import check_bucket, opened, reporting
 from livebode.locations.url import Location, Url, location

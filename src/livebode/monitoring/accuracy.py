@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from livebode.arrays import Floats
 from livebode.core import normal_quantile
+from livebode.dataclass import dataclass
 
 _BATCHES = (2, 4, 8)  # windows: slow disturbances show in the means of the longer ones only
 STRETCH = 24  # windows, over which the deviations from the baseline are estimated

@@ -12,10 +12,10 @@ source and of the record are announced.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Literal
 
 from livebode.core import Event
+from livebode.dataclass import dataclass
 from livebode.records import group_of
 
 Priority = Literal["high", "medium", "low"]

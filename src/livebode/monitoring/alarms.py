@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from math import isnan
 from typing import Any
 
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Floats
 from livebode.core import Stage, StatefulBase
+from livebode.dataclass import dataclass
 from livebode.monitoring.change_date import ChangeDate
 from livebode.monitoring.machine import LearnedMachine
 from livebode.monitoring.naming import NamedChange, ScoredWindows, bound

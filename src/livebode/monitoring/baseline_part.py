@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import BaselineError, counted
+from livebode.dataclass import dataclass
 from livebode.language import Message, recorded
 from livebode.monitoring.accuracy import ChangeAccuracy
 from livebode.monitoring.table import ScheduleTable

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Floats
 from livebode.core import Stage, StatefulBase, f_exceeded, normal_quantile, t_quantile
+from livebode.dataclass import dataclass
 from livebode.monitoring.accuracy import STRETCH, ChangeAccuracy
 from livebode.monitoring.charts import Charts
 from livebode.monitoring.evidence import Evidence

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Floats
 from livebode.core import moment
+from livebode.dataclass import dataclass
 from livebode.language import Message
 
 # A random walk of log-likelihood ratios exceeds ln(1/p) with at most p, on each side of the change (Wald).

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from itertools import pairwise, product
 
 import numpy as np
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Floats
 from livebode.core import BaselineError
+from livebode.dataclass import dataclass
 
 _MARGIN = 0.1  # of the learned range, beyond which the influence is unknown
 _CONSTANT = 1e-6  # of the mean: a smaller range is rounding

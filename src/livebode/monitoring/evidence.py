@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from livebode.arrays import Floats
 from livebode.core import RowArrays
+from livebode.dataclass import dataclass
 
 JUDGED, UNEVEN, SLOW, FAST, PLACE, DISTURBED = "judged", "uneven", "slow", "fast", "place", "disturbed"
 COVARIATE, NO_COVARIATE, UNEXCITED, AMPLITUDE = "covariate", "no covariate", "unexcited", "amplitude"

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from livebode.arrays import Floats
+from livebode.dataclass import dataclass
 from livebode.language import Message
 from livebode.monitoring.stretches import SampleSection
 from livebode.monitoring.table import STILL, ScheduleTable, WindowRows

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from math import floor
 
 import numpy as np
 from numpy.typing import NDArray
 
 from livebode.arrays import Floats
+from livebode.dataclass import dataclass
 from livebode.monitoring.accuracy import ChangeAccuracy
 from livebode.monitoring.amplitude import InputAmplitude
 from livebode.monitoring.between_runs import BetweenRuns

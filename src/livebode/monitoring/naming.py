@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from livebode.arrays import Floats
 from livebode.core import INTERVAL_FACTOR
+from livebode.dataclass import dataclass
 from livebode.monitoring.accuracy import ChangeAccuracy
 from livebode.monitoring.sensitivity import DIRECTIONS, FAR, LocalChange
 

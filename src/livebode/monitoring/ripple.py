@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from livebode.arrays import Floats
 from livebode.core import needing
+from livebode.dataclass import dataclass
 
 _COHERENT = 100.0  # windows in which a ripple may add up as if they were one
 

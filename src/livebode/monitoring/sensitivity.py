@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
 from livebode.arrays import Floats
+from livebode.dataclass import dataclass
 from livebode.monitoring.ripple import torques
 from livebode.motion import MovingModel, late
 from livebode.simulation import Pair, open_belt

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from livebode.arrays import Floats
 from livebode.core import Block, Stage, StatefulBase
+from livebode.dataclass import dataclass
 
 
 class SampleBuffer(StatefulBase):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -10,6 +9,7 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Floats
 from livebode.core import Parameters, Responses, RowArrays, Stage, StatefulBase
+from livebode.dataclass import dataclass
 from livebode.monitoring.accuracy import ChangeAccuracy
 
 

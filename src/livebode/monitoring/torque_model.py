@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from livebode.arrays import Floats
 from livebode.core import Block, SignalError
+from livebode.dataclass import dataclass
 from livebode.motion import (
     SLOWEST,
     OutputKind,

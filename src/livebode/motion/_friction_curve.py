@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -10,6 +9,7 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Floats
 from livebode.core import COVERAGE, Block, SignalError, UsageError, t_quantile
+from livebode.dataclass import dataclass
 from livebode.motion.robust_regression import Regression, regress
 from livebode.motion.smooth_motion import OutputKind, SmoothMotion
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Floats
 from livebode.core import SignalError, UsageError
+from livebode.dataclass import dataclass
 from livebode.kernel import SlidingDFT
 
 SLOWEST = 0.05  # of the highest speed, from which on an axis counts as moving

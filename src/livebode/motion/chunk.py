@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Any
 
 import numpy as np
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Floats
 from livebode.core import PER_LINE, PER_RESPONSE, Block, Lines, Responses, Stage, StatefulBase
+from livebode.dataclass import dataclass
 from livebode.estimation import PlausibleRange
 from livebode.kernel import SlidingDFT
 

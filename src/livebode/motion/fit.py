@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from livebode.arrays import Complex, Floats
 from livebode.core import FitError
+from livebode.dataclass import dataclass
 from livebode.fitting import minimise, scan, two_masses
 from livebode.kernel import BeltGrid, BeltRows, BeltSplines, belt_together
 from livebode.motion.model import MovingModel, PositionCurve, basis

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Floats
 from livebode.core import Responses, Stage, StatefulBase
+from livebode.dataclass import dataclass
 from livebode.estimation import Settings
 from livebode.motion.chunk import FLAT_M, Chunk, steady_rows
 from livebode.motion.fit import MotionFitOptions, WeightedResponses, sampled

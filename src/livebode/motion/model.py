@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from livebode.arrays import Floats
+from livebode.dataclass import dataclass
 from livebode.kernel import CurveShape, curve_at, curve_splines
 
 _DEGREE = 3  # cubic: the stiffness of a belt has no bend

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from livebode.arrays import Floats
 from livebode.core import PID, Block, Cascade, Channel, Loop, Responses, SimulationError, Stage, StatefulBase
+from livebode.dataclass import dataclass
 from livebode.estimation import Settings, Tracker
 from livebode.kernel import BeltCourse, BeltMasses, belt_replay
 from livebode.motion.chunk import Chunk

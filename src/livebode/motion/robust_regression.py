@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from livebode.arrays import Floats
 from livebode.core import SignalError
+from livebode.dataclass import dataclass
 
 _CONDITION = 1e-10  # of the scaled normal matrix
 _COSINES = 0.4  # times samples^(2/3): cosines of the long-run covariance

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -10,6 +9,7 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Floats
 from livebode.core import Block, SignalError, UsageError
+from livebode.dataclass import dataclass
 
 OutputKind = Literal["position", "velocity"]
 

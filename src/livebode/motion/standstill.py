@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from livebode.arrays import Floats
 from livebode.core import Event, Responses, Stage, StatefulBase
+from livebode.dataclass import dataclass
 from livebode.estimation import Settings
 from livebode.language import Message
 from livebode.motion.chunk import Chunk, steady_rows

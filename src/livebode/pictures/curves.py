@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -10,6 +9,7 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Floats
 from livebode.core import Response, Responses, decibels
+from livebode.dataclass import dataclass
 
 SPAN = (0.05, 0.95)
 FLOOR_DB = -1000.0

@@ -6,13 +6,13 @@ The layout has room for the letters of a telephone, on which all texts are half 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from livebode.arrays import Floats
+from livebode.dataclass import dataclass
 from livebode.language import numerals, tr
 from livebode.pictures import ticks
 

@@ -5,7 +5,6 @@ docs/decisions/0003-terminal-plot.md has the reasons for drawing it here.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import groupby
 
 import numpy as np
@@ -14,6 +13,7 @@ from rich.style import Style
 
 from livebode.arrays import Floats
 from livebode.core import Response, Responses, counted
+from livebode.dataclass import dataclass
 from livebode.pictures import ticks, words
 from livebode.pictures._style import shortened
 from livebode.pictures.curves import Summary, summarised

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from livebode.arrays import Complex, Floats
 from livebode.core import Lines, LivebodeError
+from livebode.dataclass import dataclass
 from livebode.estimation import Settings
 from livebode.excitation import recognise
 from livebode.preparation._role_spectra import role_spectra

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Floats
 from livebode.core import Channel, QuantityKind
+from livebode.dataclass import dataclass
 from livebode.estimation import Role, Settings
 from livebode.preparation.checks import POWERLESS_SHARE
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Container, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Flags, Floats
 from livebode.core import Block, Event
+from livebode.dataclass import dataclass
 from livebode.estimation import PLACES, Movement, Settings, SpikeGate
 from livebode.excitation import alike, cut, filled, leading, medians, spectra, unlike
 from livebode.language import Message

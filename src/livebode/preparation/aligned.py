@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from livebode.core import Block, Channel, Event
+from livebode.dataclass import dataclass
 from livebode.estimation import Settings
 from livebode.excitation import Slip, find_slips
 from livebode.language import Message

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import tomli_w
 
 from livebode.configuration import Axis, check_fit
 from livebode.core import Lines, LivebodeError
+from livebode.dataclass import dataclass
 from livebode.estimation import DETECTION_LINES_MIN
 from livebode.excitation import recognise
 from livebode.language import Message

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 import numpy as np
 
 from livebode.core import Block, Channel, QuantityKind, RecordingError
+from livebode.dataclass import dataclass
 from livebode.preparation.plan import RecordedSource
 from livebode.sources import Log, Skipped, UnevenLog
 

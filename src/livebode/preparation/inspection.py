@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from itertools import groupby
 from pathlib import Path
 from typing import Any, Literal
@@ -11,6 +11,7 @@ from typing import Any, Literal
 import numpy as np
 
 from livebode.core import Lines, LivebodeError, RecordingError, UsageError
+from livebode.dataclass import dataclass
 from livebode.estimation import nearest_hop
 from livebode.excitation import Excitation, pattern, recognise
 from livebode.locations import Location

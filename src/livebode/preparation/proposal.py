@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from livebode.arrays import Floats
+from livebode.dataclass import dataclass
 from livebode.language import Message
 from livebode.preparation._role_evidence import RoleEvidence
 from livebode.preparation._role_spectra import DRIVING, NAMED_INPUT, NAMED_OUTPUT, ChannelQuantities

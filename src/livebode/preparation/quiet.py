@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from livebode.core import Block, Lines, SignalError
+from livebode.dataclass import dataclass
 from livebode.estimation import (
     SECONDS_MIN,
     Hum,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from functools import partial
 from itertools import combinations
 
@@ -11,6 +10,7 @@ import numpy as np
 
 from livebode.arrays import Complex, Floats
 from livebode.core import ANY_EXCITATION, Channel, LivebodeError, SignalError
+from livebode.dataclass import dataclass
 from livebode.estimation import Role, Settings
 from livebode.language import Message
 from livebode.preparation._role_spectra import ChannelQuantities, RoleSpectra, role_spectra

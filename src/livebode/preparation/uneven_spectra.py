@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from livebode.arrays import Complex, Floats
 from livebode.core import LEFT_OUT, NOT_WHOLE, Channel, SignalError, Spectra, SpectraLayout, rms
+from livebode.dataclass import dataclass
 from livebode.estimation import LineStage, Settings, UnevenSpectra, UnevenWindow
 from livebode.preparation.uneven_segments import segments
 from livebode.sources import ClockGroup, Resampler, UnevenLog

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from datetime import UTC, datetime
 from typing import Any, Literal
 
@@ -12,6 +12,7 @@ import numpy as np
 
 from livebode.configuration import filled
 from livebode.core import Parameters, Responses
+from livebode.dataclass import dataclass
 from livebode.monitoring import Priority
 
 Condition = Literal["alarm", "ended", "event"]

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from math import nan
 from typing import Any
 
 from livebode.core import Event, RunClock, UsageError, moment, moments_by, needing
+from livebode.dataclass import dataclass
 from livebode.records.confined_sql import QueryResult, QueryTables, answer_query
 from livebode.records.grouped_events import each_event, event_rows
 from livebode.records.json_format import to_json

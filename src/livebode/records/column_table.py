@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
+from livebode.dataclass import dataclass
 from livebode.tables import Field, Schema
 
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from typing import Any
 
 from livebode.core import UsageError, not_installed
+from livebode.dataclass import dataclass
 
 # It reads only the given tables and writes nothing, so that an untrusted query can be run.
 _CONFINED = (

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from livebode.core import Event
+from livebode.dataclass import dataclass
 
 _FIELDS = {"group", "count", "first_s", "last_s", "repeats", "counted"}  # that a group adds
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Complex
 from livebode.core import REASONS, Lines, MatrixResponses
+from livebode.dataclass import dataclass
 from livebode.records import response_table
 from livebode.records._result_rows import result_rows
 from livebode.records.column_table import ColumnTable

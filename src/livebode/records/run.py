@@ -6,7 +6,7 @@ import logging
 import warnings
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from math import nan
 from os import PathLike
 from pathlib import Path
@@ -26,6 +26,7 @@ from livebode.core import (
     RunClock,
     SourceUnit,
 )
+from livebode.dataclass import dataclass
 from livebode.locations import original
 from livebode.records.grouped_events import still_waiting
 from livebode.records.matrix_run import (

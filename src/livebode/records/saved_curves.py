@@ -6,7 +6,7 @@ import math
 import re
 import secrets
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, TypeVar, get_args
@@ -14,6 +14,7 @@ from typing import Any, TypeVar, get_args
 import numpy as np
 
 from livebode.core import Lines, Quantity, RecordError, Responses, write_whole, writing
+from livebode.dataclass import dataclass
 from livebode.records.inside import read_bytes
 from livebode.records.json_format import check_version, format_of
 from livebode.records.summary_file import from_document, is_run, to_document

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from livebode.configuration import Axis, RecordSection
 from livebode.core import ConfigError, Event
+from livebode.dataclass import dataclass
 from livebode.estimates import rule
 from livebode.language import Message
 from livebode.runtime.estimate import Estimate

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 
 from livebode.core import Block, RecordError, Stage, decode, encode
+from livebode.dataclass import dataclass
 from livebode.sources.live import ClockReading, LiveBlock, Position
 
 SOURCE = "source"

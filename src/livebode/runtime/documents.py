@@ -7,11 +7,11 @@ it must return at once and must not raise; longer work belongs to another thread
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias, Union
 
 from livebode.core import Block, Channel, Event, Responses
+from livebode.dataclass import dataclass
 
 if TYPE_CHECKING:
     from livebode.analysis import Overview

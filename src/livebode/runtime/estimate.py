@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self
@@ -18,6 +17,7 @@ from numpy.typing import NDArray
 from livebode.analysis import Overview
 from livebode.configuration import Axis
 from livebode.core import Block, Channel, ClockKind, Event, Responses, SignalError, Stateful, nearest_name
+from livebode.dataclass import dataclass
 from livebode.records import ColumnTable
 from livebode.runtime.change_detection import BaselineComparison
 from livebode.runtime.documents import Document

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Generator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from livebode.core import Responses
+from livebode.dataclass import dataclass
 from livebode.estimation import NewestSpectra, SpectraTracker
 
 ROWS_MAX = 8

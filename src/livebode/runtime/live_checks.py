@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import Block, Channel, Event
+from livebode.dataclass import dataclass
 from livebode.estimation import Settings
 from livebode.language import Message
 from livebode.preparation import (

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, Self
 
 from livebode.configuration import RecordSection
 from livebode.core import Block, Event
+from livebode.dataclass import dataclass
 from livebode.records import ColumnTable, RunDirectory
 from livebode.runtime.documents import Document, FitResults, Subscriber
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 from livebode import estimation, fitting, preparation
 from livebode.configuration import Axis, with_log
 from livebode.core import Block, Channel, Event, RecordingError
+from livebode.dataclass import dataclass
 from livebode.estimation import Follower, Tracker, hum_events, hum_spans
 from livebode.language import Message
 from livebode.locations import Location, local_copy

@@ -6,13 +6,14 @@ import time
 from collections import Counter
 from collections.abc import Mapping
 from copy import deepcopy
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import Event, Stage, decode, encode, restore_parts
+from livebode.dataclass import dataclass
 from livebode.language import Message
 from livebode.preparation import ChannelCheck
 

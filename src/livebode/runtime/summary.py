@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from livebode.configuration import Axis, recipe_id
 from livebode.core import ENCODING, Channel, ClockKind, RunClock, iso_utc
+from livebode.dataclass import dataclass
 from livebode.estimation import Follower, plant_kinds, response_unit, source_unit
 from livebode.kernel import instruction_set
 from livebode.locations import Location, local_copy

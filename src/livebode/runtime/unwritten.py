@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 from livebode.core import Block, Event, Parameters
+from livebode.dataclass import dataclass
 from livebode.records import ColumnTable, Store, as_rows, result_rows
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from livebode.arrays import Complex, Floats
 from livebode.core import Algebra
+from livebode.dataclass import dataclass
 from livebode.simulation.axis_settings import Friction
 from livebode.simulation.hold import held
 from livebode.simulation.mechanics import Mechanics, Spans

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import inf, isnan, pi
 from typing import Annotated
 
 from annotated_types import Ge, Le
 
 from livebode.core import PID, Cascade, Loop, UsageError
+from livebode.dataclass import dataclass
 from livebode.simulation.values import NonNegative, Positive, count, nonnegative, positive
 
 DELAY_TICKS_MAX = 64

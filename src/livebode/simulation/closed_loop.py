@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 
 import numpy as np
@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from livebode.arrays import Complex, Floats
 from livebode.core import Algebra
+from livebode.dataclass import dataclass
 from livebode.simulation._linear import StateSpace
 from livebode.simulation.axis_settings import Drive, Sensor
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from math import ceil, inf, isnan, log2, sqrt
 from typing import Any
 
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Floats
 from livebode.core import SimulationError, UsageError
+from livebode.dataclass import dataclass
 from livebode.simulation._linear import StateSpace, linear
 from livebode.simulation.axis_settings import Drive, Friction, Limits, Sensor
 from livebode.simulation.closed_loop import ClosedLoop

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from livebode.arrays import Complex, Floats
 from livebode.core import UsageError
+from livebode.dataclass import dataclass
 from livebode.simulation.mechanism import LinearMechanism
 from livebode.simulation.motor_loop import MotorLoop
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
 from livebode.arrays import Floats
 from livebode.core import UsageError
+from livebode.dataclass import dataclass
 from livebode.simulation.values import nonnegative, positive
 
 

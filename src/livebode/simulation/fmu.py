@@ -8,7 +8,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import field
 from math import copysign, floor, inf, isfinite, sin
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -17,6 +17,7 @@ import numpy as np
 
 from livebode.arrays import Floats
 from livebode.core import Block, Channel, SimulationError, UsageError, nearest_name, not_installed, remove_created
+from livebode.dataclass import dataclass
 from livebode.simulation.axis_settings import Drive, Limits, Sensor
 from livebode.simulation.configuration import controller_settings
 from livebode.simulation.delivery import CHANNELS, checked_block_samples, delivered, diverged, excitation_at

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 import numpy as np
 
 from livebode.arrays import Floats
 from livebode.core import Block, UsageError
+from livebode.dataclass import dataclass
 from livebode.simulation.mechanism import LinearMechanism
 from livebode.simulation.motor_loop import MotorLoop
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import sqrt
 from typing import Annotated, Literal
 
@@ -12,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from livebode.arrays import Floats
 from livebode.core import SimulationError, UsageError
+from livebode.dataclass import dataclass
 from livebode.simulation.values import NonNegative, Positive, nonnegative, positive
 
 

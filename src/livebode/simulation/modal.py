@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from livebode.arrays import Floats
 from livebode.core import UsageError
+from livebode.dataclass import dataclass
 from livebode.simulation.mechanism import LinearMechanism
 from livebode.simulation.motor_loop import MotorLoop
 

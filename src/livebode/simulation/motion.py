@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 from math import ceil, inf, isnan, sqrt
@@ -13,6 +12,7 @@ import numpy as np
 
 from livebode.arrays import Floats
 from livebode.core import UsageError
+from livebode.dataclass import dataclass
 from livebode.simulation.axis_settings import Limits
 from livebode.simulation.values import NonNegative, Positive, nonnegative, positive
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from livebode.arrays import Floats
 from livebode.core import PID, Block, Channel, UsageError
+from livebode.dataclass import dataclass
 from livebode.simulation.mechanism import LinearMechanism
 
 _TOGETHER = 32  # ticks that one matrix product advances

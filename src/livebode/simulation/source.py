@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from functools import partial
 from math import ceil
 
@@ -12,6 +11,7 @@ import numpy as np
 
 from livebode.arrays import Floats, Integers
 from livebode.core import Block, Channel, UsageError
+from livebode.dataclass import dataclass
 from livebode.simulation._axis import Engine
 from livebode.simulation.configuration import BeltAxis, engine_settings
 from livebode.simulation.delivery import CHANNELS, checked_block_samples, delivered, diverged, excitation_at

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from livebode.arrays import Floats
+from livebode.dataclass import dataclass
 from livebode.simulation._linear import Sampled, StateSpace
 from livebode.simulation.closed_loop import ClosedLoop
 from livebode.simulation.faults import Condition

@@ -6,11 +6,10 @@ It shares no code with the simulated axis but its hold, which is compared with S
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from livebode.arrays import Complex, Floats
+from livebode.dataclass import dataclass
 from livebode.simulation.hold import held
 
 RATE_HZ = 4000.0

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
 
+from livebode.dataclass import dataclass
 from livebode.sources.recording import COLUMNS_MAX, Column, Skipped, oversized
 from livebode.sources.units import split_unit
 

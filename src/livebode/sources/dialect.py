@@ -7,10 +7,11 @@ import csv
 import re
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 from livebode.core import RecordingError
+from livebode.dataclass import dataclass
 from livebode.sources.cells import EMPTY, CellKind, is_comment, is_number, is_value, is_word, kind_of, zoned
 from livebode.sources.header import find_comment_header, find_header, fits, keyed_header, no_values, stated_period_s
 from livebode.sources.recording import COLUMNS_MAX, oversized

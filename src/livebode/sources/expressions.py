@@ -9,13 +9,14 @@ import math
 import re
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from livebode.arrays import Floats
 from livebode.core import Block, Channel, QuantityKind, UsageError, read_unit
+from livebode.dataclass import dataclass
 from livebode.sources.units import split_unit
 
 _UNIT_MAX = 64

@@ -5,10 +5,11 @@ from __future__ import annotations
 import codecs
 import re
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 from livebode.core import LivebodeError, RecordingError
+from livebode.dataclass import dataclass
 from livebode.locations import Location, shared_copy
 from livebode.plugins import loaded, tables, wings_left_out
 from livebode.sources.recording import Recording, contained, located

@@ -9,11 +9,12 @@ from __future__ import annotations
 import math
 import struct
 import zlib
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import BinaryIO
 
 from livebode.core import RecordingError
+from livebode.dataclass import dataclass
 from livebode.sources.recording import damaged, oversized, truncated
 
 HEADER_BYTES = 128

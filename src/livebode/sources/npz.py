@@ -6,7 +6,6 @@ import math
 import zipfile
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any, ClassVar
 
@@ -14,6 +13,7 @@ import numpy as np
 from numpy.lib import format as npy
 from numpy.typing import NDArray
 
+from livebode.dataclass import dataclass
 from livebode.sources.arrays import Slot, array_columns
 from livebode.sources.recording import COLUMNS_MAX, Chunk, Column, Recording, Skipped, oversized, truncated
 

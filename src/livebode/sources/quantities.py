@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import lru_cache
 from typing import Any
 
@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import Channel, QuantityKind, UsageError, read_quantity, read_unit
+from livebode.dataclass import dataclass
 
 _NAMES: Mapping[QuantityKind, re.Pattern[str]] = {
     "acceleration": re.compile(r"acceler|beschleunig|加速度|(?<![a-z])acc(?![a-z])"),

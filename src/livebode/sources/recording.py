@@ -7,7 +7,7 @@ import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import LivebodeError, RecordingError
+from livebode.dataclass import dataclass
 from livebode.locations import LocalCopy, Location, original, with_originals
 from livebode.tables import PACKED_MAX
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import RecordingError
+from livebode.dataclass import dataclass
 from livebode.sources.recording import Chunk, Column
 from livebode.sources.steps import Steps
 from livebode.sources.timing import check_rate, guess_unit, stated_unit

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import RecordingError
+from livebode.dataclass import dataclass
 
 EPSILON = 2.0**-50
 """Relative uncertainty of double precision alone."""

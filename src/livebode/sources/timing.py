@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import ClockKind, RecordingError, clock_kind_of, nearest_name
+from livebode.dataclass import dataclass
 from livebode.sources.recording import Chunk, Column
 from livebode.sources.steps import Gap, Steps, exact_rate_hz
 from livebode.sources.units import SECONDS, UNIT_IN_FRONT, split_unit, time_unit

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Floats
 from livebode.core import Block, Channel, ClockKind, RecordingError, UsageError, clock_kind_of
+from livebode.dataclass import dataclass
 from livebode.sources.expressions import Expression
 from livebode.sources.log import Log
 from livebode.sources.naming import found_channel, resolve, together

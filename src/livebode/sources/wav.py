@@ -5,11 +5,11 @@ from __future__ import annotations
 import io
 import struct
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, ClassVar
 
 from livebode.core import needing
+from livebode.dataclass import dataclass
 from livebode.sources.recording import COLUMNS_MAX, Chunk, Column, Recording, damaged, oversized, truncated
 
 with needing("SciPy", "analysis", "a WAV file"):

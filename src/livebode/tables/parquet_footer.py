@@ -9,11 +9,11 @@ from __future__ import annotations
 import base64
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
 
+from livebode.dataclass import dataclass
 from livebode.tables.arrow_ipc import schema_from_message
 from livebode.tables.parquet_format import (
     ARROW_SCHEMA,

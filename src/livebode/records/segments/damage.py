@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 from livebode.core import Event
+from livebode.dataclass import dataclass
 from livebode.language import Message
 
 KIND = "record-damaged"

@@ -5,7 +5,8 @@ from __future__ import annotations
 import struct
 import zlib
 from collections.abc import Iterator
-from dataclasses import dataclass
+
+from livebode.dataclass import dataclass
 
 FORMAT, ROWS, COMMIT, TABLE = 1, 2, 3, 4
 """Kinds: the format and its version; an Arrow record batch of a table; a commit; a table's name and Arrow schema."""

@@ -8,11 +8,12 @@ import math
 import os
 import struct
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Any
 
 from livebode.core import RecordError, replace_file, sync_directory
+from livebode.dataclass import dataclass
 from livebode.records.column_table import ColumnTable
 from livebode.records.inside import check_folder, open_read
 from livebode.records.json_format import check_version, format_of

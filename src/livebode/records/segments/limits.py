@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from livebode.dataclass import dataclass
 
 JOURNALS = 3
 """Files next to closed segments, each of a journal's size: the converted journal, its segments, the next journal."""

@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, field
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 from livebode.core import Event, RecordError
+from livebode.dataclass import dataclass
 from livebode.records.inside import read_bytes
 from livebode.records.json_format import VERSIONS, check_version, format_of
 from livebode.records.segments import journal

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 
 from livebode.core import RecordError, remove_files
+from livebode.dataclass import dataclass
 from livebode.records.removal import foreign, remove
 from livebode.records.segments import journal, manifest
 from livebode.records.segments.journal import Commit, Journal

@@ -5,11 +5,11 @@ from __future__ import annotations
 import io
 import os
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NoReturn
 
 from livebode.core import Event, needing
+from livebode.dataclass import dataclass
 from livebode.records.segments import reading
 from livebode.records.segments.manifest import Segment
 from livebode.tables import ParquetFile

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
+from livebode.dataclass import dataclass
 from livebode.records.segments.frames import ROWS, to_frame
 from livebode.tables import Table, to_message
 

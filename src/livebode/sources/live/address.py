@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from urllib.parse import unquote, urlsplit
 
 from livebode.core import ConfigError
+from livebode.dataclass import dataclass
 from livebode.plugins import named
 from livebode.sources.live.settings import SourceKeys, check_keys
 

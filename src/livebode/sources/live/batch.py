@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import nan
 
 import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import Block, Channel, SourceError
+from livebode.dataclass import dataclass
 from livebode.sources.live.position import Mark, Origin
 from livebode.sources.quantities import DeclaredQuantities, in_si
 

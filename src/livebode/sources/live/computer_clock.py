@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import cache
 from pathlib import Path
 
+from livebode.dataclass import dataclass
 from livebode.language import Message
 
 SET_S = 1.0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, BinaryIO, ClassVar
 
@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import Channel, LivebodeError, SourceError
+from livebode.dataclass import dataclass
 from livebode.language import Message
 from livebode.sources.delimited import DelimitedRecording
 from livebode.sources.live.address import Address

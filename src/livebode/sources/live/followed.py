@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import zlib
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import BinaryIO, Literal, Self
 
+from livebode.dataclass import dataclass
 from livebode.sources.live.position import Mark
 
 PIECE_BYTES = 1 << 19

@@ -6,7 +6,7 @@ import json
 import time
 from collections import deque
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from threading import Timer
 from typing import TYPE_CHECKING, Any, cast
 
@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import Block, Channel, SourceError
+from livebode.dataclass import dataclass
 from livebode.locations import Url
 from livebode.plugins import loaded, named
 from livebode.sources.live.address import parse_address

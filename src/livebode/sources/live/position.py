@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
+from livebode.dataclass import dataclass
 from livebode.sources.live.computer_clock import ClockReading
 
 Mark = Mapping[str, Any]

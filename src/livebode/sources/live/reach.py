@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, Literal
 
+from livebode.dataclass import dataclass
 from livebode.sources.live.address import Address
 
 TIMEOUT_S = 3.0

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
@@ -19,6 +18,7 @@ from livebode.core import (
     UsageError,
     ValueCheck,
 )
+from livebode.dataclass import dataclass
 from livebode.locations import Location, Url, location
 from livebode.plugins import loaded, named
 from livebode.sources.quantities import DeclaredQuantities

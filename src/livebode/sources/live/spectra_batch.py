@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 from math import nan
 
@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import Channel, SourceError, Spectra, SpectraLayout, rms
+from livebode.dataclass import dataclass
 from livebode.sources.live.batch import VALUES_MAX, Batch, LiveBlock, check_numbers
 from livebode.sources.live.position import Mark, Origin
 from livebode.sources.quantities import DeclaredQuantities, in_si

@@ -11,10 +11,10 @@ import struct
 import threading
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 from livebode.core import ConfigError
+from livebode.dataclass import dataclass
 from livebode.publishing import AxisValues, EventMessage, PublishSection
 from livebode_connect.mqtt import level
 from livebode_connect.mqtt_link import Message, MqttLink

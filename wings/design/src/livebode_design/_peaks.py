@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.dataclass import dataclass
 from livebode.excitation import Waveform
 from livebode_design.machine import QUANTITIES, Machine, OperatingPoint, Quantity, within
 

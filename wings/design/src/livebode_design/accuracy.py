@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import ceil, inf, sqrt
 
 import numpy as np
 
 from livebode.arrays import Floats
 from livebode.core import CIRCLE_FACTOR, UsageError
+from livebode.dataclass import dataclass
 from livebode.excitation import Waveform
 from livebode_design.machine import Machine
 

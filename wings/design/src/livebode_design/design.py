@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 from livebode.arrays import Floats
+from livebode.dataclass import dataclass
 from livebode.excitation import Waveform
 from livebode_design._peaks import Peak, worst
 from livebode_design.accuracy import LineAccuracy, encoder_counts

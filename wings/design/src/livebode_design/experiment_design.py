@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cache
 from importlib.util import find_spec
 from os import PathLike
@@ -22,6 +21,7 @@ from livebode.core import (
     whole_directory,
     writing,
 )
+from livebode.dataclass import dataclass
 from livebode.plugins import loaded
 from livebode.records import to_json
 from livebode_design.file_kinds import FILES

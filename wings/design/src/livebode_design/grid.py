@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fractions import Fraction
 from math import ceil, floor, gcd, lcm, log2
 
 import numpy as np
 
 from livebode.core import WINDOW_MAX, GridError, Lines, check_window, counted, meets_mains
+from livebode.dataclass import dataclass
 from livebode.estimation import default_hop
 from livebode.excitation import ORDER_MAX, ORDER_MIN, check_band, chirp_lines, odd_bins, odd_lines, stepped_lines
 from livebode_design.spec import ExperimentSpec

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import inf, isnan
 from typing import Annotated
 
 from annotated_types import Gt
 
 from livebode.core import DesignError, UsageError
+from livebode.dataclass import dataclass
 from livebode_design._peaks import Peak
 from livebode_design.machine import MOTION_KEYS, QUANTITIES, UNITS, Machine, Quantity
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Literal
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from livebode.arrays import Complex, Floats
 from livebode.core import Loop, Model, UsageError
+from livebode.dataclass import dataclass
 
 Quantity = Literal["torque", "speed", "travel", "following error"]
 QUANTITIES: tuple[Quantity, ...] = ("torque", "speed", "travel", "following error")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -22,6 +21,7 @@ from livebode.core import (
     as_model,
     integral,
 )
+from livebode.dataclass import dataclass
 from livebode_design.machine import STANDSTILL, Extremes, Machine, OperatingPoint, within
 
 Output = Literal["velocity", "position"]

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import inf
 from pathlib import Path
 from typing import Any
 
 from livebode.core import ConfigError, MeasurementError, write_whole, writing
+from livebode.dataclass import dataclass
 from livebode.plugins import loaded, named
 from livebode.sources.live import MeasureSection, Player, SourceSettings, make_source
 from livebode_design.design import Design

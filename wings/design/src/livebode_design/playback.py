@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from enum import Enum, auto
 from pathlib import Path
 from typing import Self
@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import Block, ConfigError, LivebodeError, MeasurementError, nearest_name, writing
+from livebode.dataclass import dataclass
 from livebode.sources.live import LiveBlock, Player
 from livebode_design.design import Design
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import Annotated, Literal, get_args
 
 import numpy as np
 from annotated_types import Ge, Le, Len
 
 from livebode.core import MAINS_HZ, UsageError
+from livebode.dataclass import dataclass
 from livebode.excitation import ORDER_MAX, ORDER_MIN, Phases, Sweep, check_order
 
 KIND_OF_KEY = {"order": "prbs", "rate_divider": "prbs", "sweep": "chirp", "periods": "stepped"}

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 
 from livebode.configuration import recorded_configuration
 from livebode.core import BaselineError, Lines, LivebodeError, MatrixResponses, counted
+from livebode.dataclass import dataclass
 from livebode.fitting import mean_matrix
 from livebode.records import RunRecord
 from livebode_matrix.settings import MatrixSettings

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Floats
 from livebode.core import CIRCLE_FACTOR, FitError, GridError, MatrixResponses, needing, widened
+from livebode.dataclass import dataclass
 from livebode.fitting import mean_matrix
 from livebode.language import Message
 from livebode_matrix.line_correlation import INDEPENDENT, LineCorrelation, RowSteps

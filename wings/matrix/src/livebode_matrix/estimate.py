@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Flags, Floats
+from livebode.dataclass import dataclass
 
 _SURE = 3.0
 """An input moves by itself where the smallest singular value is this many times what noise alone has."""

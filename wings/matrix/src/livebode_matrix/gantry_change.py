@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from livebode.arrays import Floats
 from livebode.core import MatrixResponses, needing, normal_quantile
+from livebode.dataclass import dataclass
 from livebode.language import Message
 from livebode.simulation import Gantry
 from livebode_matrix.change import ALPHA, MatrixChange, compare_matrices

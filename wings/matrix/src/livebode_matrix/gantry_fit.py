@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from livebode.arrays import Complex, Floats
 from livebode.core import COVERAGE, MatrixResponses, UsageError, needing, normal_quantile
+from livebode.dataclass import dataclass
 from livebode.language import Message
 from livebode.simulation import Gantry
 from livebode_matrix.least_squares import minimise

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
 from livebode.arrays import Complex, Floats
 from livebode.core import needing, normal_quantile
+from livebode.dataclass import dataclass
 from livebode_matrix.whitening import WeightedMatrix, stacked
 
 Model = Callable[[Floats], Complex]

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Flags, Floats
 from livebode.core import MatrixResponses
+from livebode.dataclass import dataclass
 from livebode.fitting import mean_matrix
 
 _STEPS_MIN, _STEPS_MAX = 10, 128

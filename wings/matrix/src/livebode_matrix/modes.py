@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Floats
 from livebode.core import COVERAGE, FitError, MatrixResponses, Parameters, Responses
+from livebode.dataclass import dataclass
 from livebode.fitting import (
     CommonPoles,
     Hold,

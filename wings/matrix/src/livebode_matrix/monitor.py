@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from livebode.core import Event, FitError, MatrixResponses, Stage, StatefulBase, UsageError, moment
+from livebode.dataclass import dataclass
 from livebode.fitting import mean_matrix
 from livebode.language import Message
 from livebode.simulation import Gantry

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, field, replace
 from pathlib import Path
 from typing import Any, ClassVar, Self
 
@@ -25,6 +25,7 @@ from livebode.core import (
     Stateful,
     StatefulBase,
 )
+from livebode.dataclass import dataclass
 from livebode.estimation import nearest_hop, quarter_hop
 from livebode.preparation import LIVE_RESPONSES_PER_S, check_length, chosen_part, is_timed
 from livebode.records import MATRIX_TABLES

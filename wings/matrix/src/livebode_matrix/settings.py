@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from typing import Literal
 
 from livebode.core import CHANNELS_MAX, Lines, MatrixLoop, UsageError
+from livebode.dataclass import dataclass
 from livebode.estimation import nearest_hop
 
 Method = Literal["direct", "joint", "indirect"]

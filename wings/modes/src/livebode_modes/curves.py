@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from livebode.arrays import Floats
+from livebode.dataclass import dataclass
 from livebode.records import RunRecord
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
@@ -14,6 +14,7 @@ from threadpoolctl import ThreadpoolController
 
 from livebode.configuration import Axis
 from livebode.core import Block, Channel, Event, Parameters, SignalError, Stateful
+from livebode.dataclass import dataclass
 from livebode.language import Message
 from livebode.records import PARAMETERS
 from livebode.runtime import Document, Estimate, FitResults, Outcome, versions

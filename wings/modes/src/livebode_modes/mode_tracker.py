@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from livebode.arrays import Floats
 from livebode.core import Block, Emit, Event, ignore
+from livebode.dataclass import dataclass
 from livebode.language import Message
 from livebode_modes.correlations import hop_correlations
 from livebode_modes.output_only_settings import HOPS_MIN, OutputOnlySettings

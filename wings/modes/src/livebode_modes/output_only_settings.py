@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 from livebode.configuration import OUTPUTS_MAX
 from livebode.core import SignalError, UsageError
+from livebode.dataclass import dataclass
 
 HOPS, HOPS_MIN, HOPS_MAX = 20, 10, 200
 """Hops in a window: default, and limits. The bounds follow from their scatter."""

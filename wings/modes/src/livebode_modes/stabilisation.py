@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from livebode.arrays import Floats
+from livebode.dataclass import dataclass
 from livebode_modes.subspace import Poles, Subspace
 
 ORDER_MAX = 20

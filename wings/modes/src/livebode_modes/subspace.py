@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from livebode.arrays import Complex, Floats
+from livebode.dataclass import dataclass
 from livebode_modes.correlations import hankel
 
 _ROUNDING = 1e-9  # of the largest singular value: smaller ones are rounding

@@ -6,7 +6,6 @@ Only the results are simulated, not the recordings. The same rows on every call.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from hashlib import sha256
 from pathlib import Path
@@ -15,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from livebode.core import LEVELS, needing
+from livebode.dataclass import dataclass
 from livebode.interface import EXAMPLES, Example
 from livebode.version import __version__
 

@@ -9,7 +9,6 @@ for each limit.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import inf, isfinite, log, nan, sqrt
 from typing import Any, Literal
 
@@ -19,6 +18,7 @@ from livebode.analysis import LoopReport
 from livebode.arrays import Floats
 from livebode.configuration import MAGNITUDES, MARGIN_UNITS, LimitSection
 from livebode.core import Loop, Response, normal_quantile
+from livebode.dataclass import dataclass
 from livebode.estimation import convert
 from livebode.fitting import Fit
 from livebode.language import Message

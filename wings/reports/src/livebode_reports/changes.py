@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import hypot, isfinite
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy as np
 from livebode.analysis import Margins, OpenLoop, against_lines, fit_averaged, margins
 from livebode.configuration import FitSection, LoopSection, recorded_configuration
 from livebode.core import INTERVAL_FACTOR, LivebodeError, normal_quantile
+from livebode.dataclass import dataclass
 from livebode.fitting import Fit
 from livebode.language import Message
 from livebode_reports.difference import ALPHA, RunDifferences

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from datetime import datetime
 from math import isfinite
 from pathlib import Path
@@ -28,6 +27,7 @@ from livebode.core import (
     counted,
     with_bound,
 )
+from livebode.dataclass import dataclass
 from livebode.estimates import kind_of
 from livebode.language import Message, number, quantity_name, recorded, tr, trn, worded
 from livebode.records import RunRecord, event_counts, read_summary

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import log
 
 import numpy as np
@@ -12,6 +12,7 @@ from livebode.analysis import RunMean, averaged
 from livebode.arrays import Floats
 from livebode.configuration import TrackingSection, recorded_configuration
 from livebode.core import PER_LINE, GridError, Lines, Response, Responses, same_frequencies, same_rate, widened
+from livebode.dataclass import dataclass
 from livebode.fitting import RunningMean
 from livebode.language import Message
 from livebode.records import RunRecord

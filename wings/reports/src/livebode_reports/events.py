@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 from livebode.core import Event, Finding, Paragraph, Part, PrintedTable, moment
+from livebode.dataclass import dataclass
 from livebode.language import number, recorded, tr, trn, worded
 from livebode.monitoring import UNMONITORED, result_tone
 from livebode.records import RunRecord, each_event, event_counts

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 from typing import Any
 
 from livebode.configuration import ReportSection
 from livebode.core import Document, Finding, GridError, Section, Tone
+from livebode.dataclass import dataclass
 from livebode.estimates import MATRIX, rule
 from livebode.language import tr, worded
 from livebode.records import RunRecord

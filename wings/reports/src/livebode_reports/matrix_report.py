@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from datetime import datetime
 from math import inf, isfinite
 from pathlib import Path
@@ -27,6 +26,7 @@ from livebode.core import (
     moment,
     with_bound,
 )
+from livebode.dataclass import dataclass
 from livebode.language import number, tr, trn, worded
 from livebode.records import RunRecord
 from livebode_reports import first_page, sections

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from livebode.arrays import Floats
 from livebode.core import OK
+from livebode.dataclass import dataclass
 from livebode.fitting import NO_RESPONSE
 from livebode.language import listed, number, worded
 from livebode.records import RunRecord

@@ -10,7 +10,7 @@ import json
 import re
 import struct
 import tempfile
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cache
 from importlib.resources import files
 from importlib.util import find_spec
@@ -32,6 +32,7 @@ from livebode.core import (
     Section,
     not_installed,
 )
+from livebode.dataclass import dataclass
 from livebode.language import current_language, worded
 from livebode.pictures import LIGHT, columns
 from livebode_reports.html import readable

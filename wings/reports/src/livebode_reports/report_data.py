@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -21,6 +21,7 @@ from livebode.analysis import (
 )
 from livebode.configuration import FitSection, LoopSection, ReportSection, recorded_configuration, recorded_report
 from livebode.core import Gain, LivebodeError, Model, Response, Responses, SourceUnit, date_and_time
+from livebode.dataclass import dataclass
 from livebode.fitting import Fit
 from livebode.language import listed, tr, worded
 from livebode.records import RunRecord, source_unit_in

@@ -11,11 +11,12 @@ import threading
 import time
 from collections import OrderedDict, deque
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import IO, Any, Literal
 
 from livebode.core import ServerError
+from livebode.dataclass import dataclass
 from livebode.language import Message
 
 RUNNING_MAX = 4

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import ceil
 from typing import Any
 
 import numpy as np
 
 from livebode.arrays import Floats
+from livebode.dataclass import dataclass
 from livebode.sources import Log
 
 OVERVIEW_PIECES = 1 << 16

@@ -5,11 +5,11 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from livebode.core import LivebodeError, ServerError
+from livebode.dataclass import dataclass
 from livebode.language import Message
 from livebode.records import is_run, read_bytes
 

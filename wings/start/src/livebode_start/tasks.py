@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,7 @@ from typing import Any
 import tomli_w
 
 from livebode.core import ServerError, UsageError, write_whole, writing
+from livebode.dataclass import dataclass
 from livebode.language import Message
 from livebode.plugins import named
 from livebode_start.jobs import JobOrder

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from math import inf
 
 from livebode.configuration import LoopSection, PIDSection
+from livebode.dataclass import dataclass
 
 _RULES = ("backward", "forward", "trapezoidal", "continuous")
 _WHERE = ("plant input", "velocity reference", "output")

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 
 from livebode.configuration import LoopSection
 from livebode.core import INTERVAL_FACTOR, Loop
+from livebode.dataclass import dataclass
 from livebode_control.loop_check.loop_changes import LoopChange, single_changes
 from livebode_control.loop_check.loop_equation import LoopResidual, LoopSignals
 from livebode_control.loop_check.loop_images import held_paths

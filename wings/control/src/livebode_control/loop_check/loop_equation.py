@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Floats
 from livebode.core import Block, Lines, Loop, SignalError, needing
+from livebode.dataclass import dataclass
 from livebode_control.loop_check.loop_images import HeldSamples, held_paths
 
 WINDOWS_MIN = 8

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 from livebode.arrays import Complex, Floats
 from livebode.core import Cascade, DriveTiming, Model
+from livebode.dataclass import dataclass
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +11,7 @@ import numpy as np
 from livebode.analysis import CONTRADICTED, LoopReport, checked_loop, fit_run, loop_report
 from livebode.configuration import Axis, FitSection, LoopSection, recorded_configuration
 from livebode.core import Responses
+from livebode.dataclass import dataclass
 from livebode.language import Message
 from livebode.records import RunRecord
 from livebode_control.tuning.filter_proposal import Tuning, tuning

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 from livebode.arrays import Floats
 from livebode.core import COVERAGE
+from livebode.dataclass import dataclass
 from livebode.motion import FrictionCurve, friction_curve
 from livebode_control.strokes.motion_samples import MotionSamples
 

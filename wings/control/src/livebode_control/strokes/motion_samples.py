@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 
 from livebode.configuration import Axis, recorded_configuration
 from livebode.core import Block, Lines, RecordError, UsageError
+from livebode.dataclass import dataclass
 from livebode.locations import Location
 from livebode.motion import OutputKind
 from livebode.records import RunRecord

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from livebode.core import UsageError, widened
+from livebode.dataclass import dataclass
 from livebode_control.strokes.shaft_orders import ShaftOrders
 
 FALSE_ALARM = 1e-3

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from livebode.arrays import Floats
 from livebode.core import Block, SignalError, UsageError
+from livebode.dataclass import dataclass
 from livebode.motion import (
     SLOWEST,
     FrictionCurve,

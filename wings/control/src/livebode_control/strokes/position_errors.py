@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -10,6 +9,7 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Floats
 from livebode.core import CIRCLE_FACTOR, widened
+from livebode.dataclass import dataclass
 from livebode.motion import AngleWindows, Shaft
 
 _STROKES_MIN = 5  # fewer give no usable scatter

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Floats
 from livebode.core import log_sum_exceeded
+from livebode.dataclass import dataclass
 from livebode.motion import Stroke
 
 _WINDOWS_MIN = 8

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from livebode.analysis import stable
 from livebode.arrays import Floats
 from livebode.core import Algebra, Model, TuneError, UsageError
+from livebode.dataclass import dataclass
 from livebode_control.tuning.feedback_parts import FeedbackParts
 from livebode_control.tuning.filters import Biquad, low_pass, notch
 from livebode_control.tuning.plant_band import PlantBand

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import inf, isfinite
 from typing import NamedTuple
 
@@ -11,6 +11,7 @@ import numpy as np
 
 from livebode.arrays import Complex, Floats
 from livebode.core import PID, Cascade, Model, PositionPD, integral
+from livebode.dataclass import dataclass
 
 
 class FeedbackTerm(NamedTuple):

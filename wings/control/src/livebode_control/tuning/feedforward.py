@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import numpy as np
 
 from livebode.arrays import Floats
 from livebode.core import Responses, SignalError, t_quantile
+from livebode.dataclass import dataclass
 from livebode.motion import FrictionCurve
 
 _OF_ANTIRESONANCE = 0.5  # the lines below this share of its frequency show the inertia

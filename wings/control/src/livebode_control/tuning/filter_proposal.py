@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 
 from livebode.analysis import MARGIN_NAMES, Margins, OpenLoop, margins, worst
 from livebode.core import FitError, Parameters, UsageError
+from livebode.dataclass import dataclass
 from livebode.language import Message
 from livebode_control.tuning.filters import Biquad, low_pass, notch_over
 

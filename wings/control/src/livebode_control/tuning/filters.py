@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import atan, pi, sqrt, tan
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from livebode.core import Algebra, UsageError
+from livebode.dataclass import dataclass
 
 Polynomial = tuple[float, float, float]
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from livebode.arrays import Floats
 from livebode.core import Loop, Responses, UsageError
+from livebode.dataclass import dataclass
 from livebode_control.tuning.plant_band import PlantBand
 from livebode_control.tuning.predicted import PredictedMargins
 from livebode_control.tuning.problem import TuningProblem

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import exp, pi, sqrt
 
 import numpy as np
@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from livebode.arrays import Complex, Floats
 from livebode.core import Parameters, TuneError, UsageError
+from livebode.dataclass import dataclass
 
 TOLERANCE = 0.05
 _FREQUENCIES, _DAMPINGS, _TURNS = 25, 3, 16

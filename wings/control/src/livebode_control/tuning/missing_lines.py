@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from decimal import Decimal
 from fractions import Fraction
 from itertools import pairwise
 from math import ceil, floor
 
 from livebode.core import Lines
+from livebode.dataclass import dataclass
 
 _DECIMALS_MAX = 9
 

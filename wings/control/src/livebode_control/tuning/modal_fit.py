@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Literal
 
 import numpy as np
 
 from livebode.arrays import Complex, Floats
+from livebode.dataclass import dataclass
 
 DAMPING_LEAST = 0.003
 """Least damping ratio of a mode above the lines: that of steel screwed to steel."""

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Floats
 from livebode.core import CIRCLE_FACTOR, Responses, TuneError
+from livebode.dataclass import dataclass
 from livebode_control.tuning.modal_fit import ModalFit
 
 _BETWEEN = 3  # points between neighbouring lines, or more

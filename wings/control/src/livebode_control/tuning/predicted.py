@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import inf, isfinite
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from livebode.arrays import Complex, Floats
+from livebode.dataclass import dataclass
 
 _POINTS = 24  # on the edge of a disc
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from livebode.arrays import Complex, Floats
 from livebode.core import Model, integral
+from livebode.dataclass import dataclass
 from livebode_control.tuning.plant_band import PlantBand, cubic
 
 _PER_OCTAVE = 20

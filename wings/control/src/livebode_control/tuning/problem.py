@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from livebode.analysis import stable
 from livebode.arrays import Complex, Floats
+from livebode.dataclass import dataclass
 from livebode_control.tuning.plant_band import PlantBand
 from livebode_control.tuning.predicted import gain_margin_db, phase_margin_deg
 from livebode_control.tuning.specification import LoopSpecification

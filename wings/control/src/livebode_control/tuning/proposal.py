@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from math import inf
 from typing import Any
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from livebode.arrays import Complex, Floats
 from livebode.core import Lines, Loop, Model, PositionPD, Responses, TuneError
+from livebode.dataclass import dataclass
 from livebode_control.tuning.coverage import check_coverage, missing_resonances
 from livebode_control.tuning.missing_lines import MissingLines
 from livebode_control.tuning.plant_band import PlantBand

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from livebode.arrays import Complex
 from livebode.core import Lines
+from livebode.dataclass import dataclass
 from livebode_control.tuning.missing_lines import MissingLines
 from livebode_control.tuning.plant_band import PlantBand
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Floats
 from livebode.core import Model
+from livebode.dataclass import dataclass
 from livebode_control.tuning.plant_band import PlantBand
 from livebode_control.tuning.problem import TuningProblem
 from livebode_control.tuning.specification import LoopSpecification

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import isfinite
 
 from livebode.core import UsageError
+from livebode.dataclass import dataclass
 
 
 @dataclass(frozen=True, kw_only=True)

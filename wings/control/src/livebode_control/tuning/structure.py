@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import reduce
 from math import isfinite, log, pi, sqrt
 
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Floats
 from livebode.core import PID, Cascade, Model, PositionPD, TuneError, integral
+from livebode.dataclass import dataclass
 from livebode_control.tuning.filters import Biquad, low_pass, notch
 
 _NOTCH_MOVES = log(1.25)  # of its centre, in each direction

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from livebode.arrays import Floats
 from livebode.core import needing
+from livebode.dataclass import dataclass
 
 with needing("SciPy", "analysis", "a validation"):
     from scipy import linalg, signal, stats

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, cast
 
@@ -13,6 +12,7 @@ from livebode.analysis import averaged, fit_averaged, fit_poles
 from livebode.arrays import Complex, Floats
 from livebode.configuration import FitSection
 from livebode.core import FitError, GridError, Response, SignalError, needing, same_rate
+from livebode.dataclass import dataclass
 from livebode.fitting import POLE_MODELS, CommonPoles, EvaluationGrid, Fit, Kind
 from livebode.language import Message
 from livebode.records import RunRecord

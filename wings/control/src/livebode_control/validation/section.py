@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 
 from livebode.configuration import FitSection, recorded_configuration
 from livebode.core import Finding, Paragraph, Part, Picture, PrintedTable, Section, Tone
+from livebode.dataclass import dataclass
 from livebode.language import number, tr, worded
 from livebode.records import RunRecord
 from livebode_control.validation.run_validation import validate_run

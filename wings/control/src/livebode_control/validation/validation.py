@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 
 from livebode.arrays import Floats
 from livebode.core import Block, Loop, SignalError, same_rate
+from livebode.dataclass import dataclass
 from livebode.fitting import Fit
 from livebode.language import Message
 from livebode_control.validation.correlation import SMALL, Correlation, correlation, own_correlation

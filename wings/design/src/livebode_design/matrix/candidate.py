@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import ceil
 
 import numpy as np
 
 from livebode.arrays import Floats
 from livebode.core import DesignError, Lines, UsageError, needing
+from livebode.dataclass import dataclass
 from livebode.excitation import MatrixExcitation, low_crest_phases
 from livebode_design.matrix.machine import LimitedPeak, MatrixLimits, MatrixMachine
 from livebode_design.matrix.spec import Kind, MatrixSpec

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
@@ -13,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from livebode.arrays import Complex, Floats
 from livebode.core import MatrixLoop, UsageError
+from livebode.dataclass import dataclass
 from livebode.excitation import MatrixExcitation
 
 _Positive = Annotated[float, Gt(0)]

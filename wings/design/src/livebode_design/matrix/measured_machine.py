@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from livebode.arrays import Complex, Floats
 from livebode.core import Lines, MatrixLoop, UsageError
+from livebode.dataclass import dataclass
 from livebode.excitation import MatrixExcitation
 from livebode_design.matrix.machine import MatrixMachine
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from livebode.arrays import Complex, Floats
 from livebode.core import CHANNELS_MAX, MatrixLoop, UsageError, counted
+from livebode.dataclass import dataclass
 from livebode.excitation import MatrixExcitation
 from livebode.simulation import MotorLoop
 from livebode_design.matrix.machine import MatrixMachine, each_of

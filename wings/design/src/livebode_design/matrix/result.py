@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
 from livebode.arrays import Complex, Floats
 from livebode.core import CIRCLE_FACTOR
+from livebode.dataclass import dataclass
 from livebode.excitation import MatrixExcitation
 from livebode_design.matrix.machine import LimitedPeak, MatrixLimits, MatrixMachine
 from livebode_design.matrix.spec import MatrixSpec

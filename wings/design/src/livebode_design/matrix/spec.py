@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Annotated, Literal, get_args
 
 import numpy as np
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Floats
 from livebode.core import CIRCLE_FACTOR, UsageError
+from livebode.dataclass import dataclass
 
 Kind = Literal["orthogonal", "interleaved", "successive"]
 KINDS: tuple[Kind, ...] = get_args(Kind)

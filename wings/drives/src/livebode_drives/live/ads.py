@@ -10,13 +10,13 @@ import ctypes
 import struct
 import time
 from collections import deque
-from dataclasses import dataclass
 from types import ModuleType
 from typing import Any, ClassVar
 
 import numpy as np
 
 from livebode.core import Channel, ConfigError, LivebodeError, SourceError, not_installed
+from livebode.dataclass import dataclass
 from livebode.sources.live import CHANNELS_MAX, SAMPLE_MAX, VALUES_MAX, Address, Batch, LiveSource, named_channels
 from livebode_drives.live.stamp_numbers import StampNumbers
 from livebode_drives.source_settings import DriveKeys

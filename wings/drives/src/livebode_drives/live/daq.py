@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
 from functools import reduce
 from itertools import pairwise
 from types import ModuleType
@@ -13,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import Channel, SourceError, nearest_name, not_installed
+from livebode.dataclass import dataclass
 from livebode.sources import split_unit
 from livebode.sources.live import CHANNELS_MAX, VALUES_MAX, Address, Batch, LiveSource, Reach
 from livebode_drives.source_settings import DriveKeys

@@ -8,7 +8,6 @@ import select
 import subprocess
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import ClassVar
 
@@ -16,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import Channel, ConfigError, SourceError, nearest_name
+from livebode.dataclass import dataclass
 from livebode.sources.live import SAMPLE_MAX, TICK_S, Address, Batch, LiveSource, Reach, named_channels
 from livebode_drives.live.hal_wiring import (
     SAMPLER_KEY,

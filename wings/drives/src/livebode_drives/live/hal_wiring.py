@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import shutil
 import subprocess
-from dataclasses import dataclass
 from pathlib import Path
 
 from livebode.core import SourceError
+from livebode.dataclass import dataclass
 
 ANSWER_S = 5.0
 """Longest wait for halcmd: a program that was killed while it held the lock of HAL blocks it permanently."""

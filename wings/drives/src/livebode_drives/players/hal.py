@@ -5,12 +5,12 @@ from __future__ import annotations
 import os
 import subprocess
 import time
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import MeasurementError
+from livebode.dataclass import dataclass
 from livebode.excitation import Waveform
 from livebode.sources.live import LiveSource, MeasureSection, Player
 from livebode_drives.live.hal import HalSource

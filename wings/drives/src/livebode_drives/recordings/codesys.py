@@ -5,13 +5,14 @@ from __future__ import annotations
 import hashlib
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import IO, ClassVar
 
 import numpy as np
 
 from livebode.core import RecordingError
+from livebode.dataclass import dataclass
 from livebode.sources import COLUMNS_MAX, Chunk, Column, Recording, Skipped, damaged, oversized
 from livebode_drives.recordings.timed_columns import TimedColumns, as_columns
 from livebode_drives.recordings.twincatwords import unique_names

@@ -6,10 +6,10 @@ rosbags writes and executes a decoder for each type, with some lines for each el
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
+from livebode.dataclass import dataclass
 from livebode.sources import COLUMNS_MAX, damaged, oversized
 
 ARRAY, SEQUENCE = 3, 4

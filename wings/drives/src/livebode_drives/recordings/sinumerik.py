@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 from typing import ClassVar
@@ -13,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import RecordingError
+from livebode.dataclass import dataclass
 from livebode.sources import Chunk, Column, Recording, contained, damaged, exact_rate_hz, truncated
 from livebode_drives.recordings.safexml import parse
 

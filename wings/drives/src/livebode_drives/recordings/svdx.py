@@ -11,7 +11,7 @@ from __future__ import annotations
 import hashlib
 import struct
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import chain
 from pathlib import Path
 from typing import IO, Any, ClassVar
@@ -20,6 +20,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 from numpy.typing import NDArray
 
+from livebode.dataclass import dataclass
 from livebode.sources import COLUMNS_MAX, Chunk, Column, Recording, Skipped, damaged, oversized, truncated
 from livebode_drives.formats import SCOPE_ENTRY, SCOPE_HEAD
 from livebode_drives.recordings.safexml import parse

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 
 from numpy.typing import ArrayLike
 
 from livebode.core import Lines, UsageError, counted
+from livebode.dataclass import dataclass
 from livebode.excitation import function_block
 from livebode.structured_text import (
     Declared,

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 from urllib.parse import urlsplit
@@ -14,6 +13,7 @@ from pydantic import Field
 
 from livebode.configuration import Axis, File, Schema, read_table, schema_of, tables_of
 from livebode.core import LEVELS, ConfigError, on_loopback
+from livebode.dataclass import dataclass
 from livebode_plant.settings_section import SettingsFile, SettingsSection, place_beside
 
 _PARTS = re.compile(r"\*\*/|\*|\?|\{(\w*)\}")

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
 
 from livebode.core import LEVELS, ArchiveError, LivebodeError
+from livebode.dataclass import dataclass
 from livebode.locations import Location, find, location, with_originals
 from livebode_plant.archive.archive_settings import Template
 from livebode_plant.lake import TABLES, DataFile, Key, Lake

@@ -9,12 +9,12 @@ import threading
 import warnings
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
-from dataclasses import dataclass
 from typing import Any
 
 import pyarrow as pa
 
 from livebode.core import ArchiveError, not_installed
+from livebode.dataclass import dataclass
 from livebode_plant.archive.archive_settings import ClusterSection
 
 try:

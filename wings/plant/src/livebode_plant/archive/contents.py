@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
 
@@ -12,6 +11,7 @@ import pyarrow.compute as pc
 from packaging.version import Version
 
 from livebode.core import LEVELS
+from livebode.dataclass import dataclass
 from livebode.language import recorded
 from livebode_plant.lake import Lake, LakeRun
 from livebode_plant.report.hall_report import RunAlarm

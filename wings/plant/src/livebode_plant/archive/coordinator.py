@@ -6,7 +6,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import partial
 from operator import attrgetter
 from typing import TYPE_CHECKING
@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import pyarrow as pa
 from packaging.version import Version
 
+from livebode.dataclass import dataclass
 from livebode.version import __version__
 from livebode_plant.archive.alone import handle_alone
 from livebode_plant.archive.archive_settings import ArchiveSettings

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import Any, Generic, Protocol, TypeVar
@@ -14,6 +14,7 @@ from distributed import KilledWorker, get_worker
 from distributed.client import ClosedClientError, FutureCancelledError
 
 from livebode.core import ArchiveError
+from livebode.dataclass import dataclass
 from livebode_plant.archive.clusters import Cluster
 
 _GROUP_S = (0.2, 10.0)

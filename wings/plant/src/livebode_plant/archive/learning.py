@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import pyarrow as pa
@@ -13,6 +13,7 @@ import pyarrow.compute as pc
 from livebode.analysis import check_no_matrix, learn_from, learnable_axis, reads_recordings
 from livebode.configuration import Axis
 from livebode.core import LEVELS, ArchiveError, LivebodeError, counted, nearest_name
+from livebode.dataclass import dataclass
 from livebode.language import quantity_name
 from livebode.locations import local_copy
 from livebode.monitoring import Baseline

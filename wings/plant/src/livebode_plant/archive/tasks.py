@@ -7,7 +7,6 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, suppress
-from dataclasses import dataclass
 from datetime import datetime
 from math import isfinite, nan
 from pathlib import Path
@@ -19,6 +18,7 @@ import pyarrow as pa
 from livebode.analysis import FittedQuantities
 from livebode.configuration import Axis, open_recording, recipe_id, recorded_configuration
 from livebode.core import ArchiveError, ConfigError, Event, MatrixResponses, Responses, writing
+from livebode.dataclass import dataclass
 from livebode.locations import local_copy
 from livebode.records import content_sha256, entries_of, lines_in, parameter_rows, to_json
 from livebode.runtime import Destination, Document, FitResults, RecordInOnePiece, run

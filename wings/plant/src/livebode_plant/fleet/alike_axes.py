@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -16,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.core import Event, Parameters, Responses
+from livebode.dataclass import dataclass
 from livebode.estimation import NewestSpectra, SpectraTracker
 from livebode.fitting import fit_each
 from livebode.runtime import Fits, SingleResponse

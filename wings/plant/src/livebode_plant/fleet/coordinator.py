@@ -12,10 +12,10 @@ import signal
 import threading
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Self
 
 from livebode.core import FleetError
+from livebode.dataclass import dataclass
 
 if TYPE_CHECKING:
     from livebode.configuration import Axis

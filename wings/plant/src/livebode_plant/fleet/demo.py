@@ -11,7 +11,6 @@ import time
 from collections import Counter
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Self
 
@@ -20,6 +19,7 @@ import numpy as np
 from livebode import excitation
 from livebode.configuration import Axis
 from livebode.core import Lines, counted
+from livebode.dataclass import dataclass
 from livebode.simulation import BeltAxis, Sensor, SimulatedAxis
 from livebode.sources.live import Batch
 from livebode_plant.fleet.coordinator import FleetCoordinator

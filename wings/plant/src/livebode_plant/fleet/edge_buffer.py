@@ -7,10 +7,10 @@ import logging
 import struct
 import threading
 from collections import deque
-from dataclasses import dataclass
 from pathlib import Path
 
 from livebode.core import FleetError, RecordError, remove_files, sync_directory
+from livebode.dataclass import dataclass
 from livebode.records import AppendFile, Lock, frames, read_bytes, to_frame
 
 FILE_BYTES = 1 << 20

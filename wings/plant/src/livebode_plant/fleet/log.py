@@ -10,11 +10,11 @@ import re
 import time
 import uuid
 from collections.abc import Awaitable, Callable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
 from livebode.core import FleetError
+from livebode.dataclass import dataclass
 from livebode_plant.fleet import subjects
 from livebode_plant.fleet.connection import connected
 from livebode_plant.fleet.fleet_settings import LogSection

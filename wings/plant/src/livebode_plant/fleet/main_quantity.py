@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import nan
 
 import numpy as np
 
 from livebode.core import Parameters
+from livebode.dataclass import dataclass
 from livebode.runtime import ChangeDetection
 
 STIFFNESS = ("N/m", "N m/rad")

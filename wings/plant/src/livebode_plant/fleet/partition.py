@@ -13,10 +13,10 @@ import socket
 import time
 from bisect import bisect_right
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 from livebode.configuration import Axis
+from livebode.dataclass import dataclass
 from livebode_plant.fleet.alike_axes import stacked_together
 from livebode_plant.fleet.axis_stream import AxisStream
 from livebode_plant.fleet.log import ClaimLostError, FleetLog

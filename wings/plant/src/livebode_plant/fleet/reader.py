@@ -8,9 +8,9 @@ import json
 import logging
 import time
 from collections.abc import AsyncIterator
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from livebode.dataclass import dataclass
 from livebode_plant.fleet.server_config import PAYLOAD_BYTES_MAX
 
 if TYPE_CHECKING:

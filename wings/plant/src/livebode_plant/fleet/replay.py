@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from hashlib import blake2b
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -16,6 +16,7 @@ import pyarrow.parquet as pq
 
 from livebode.configuration import Axis
 from livebode.core import FleetError, Responses, whole_file, writing
+from livebode.dataclass import dataclass
 from livebode.records import RESPONSE_SCHEMA, as_batch
 from livebode.tables import from_numpy, text, to_numpy
 from livebode_plant.fleet.axis_stream import AxisStream

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import struct
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, field
 from hashlib import blake2b
 from typing import Any, NamedTuple
 
@@ -14,6 +14,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from livebode.core import FleetError, Parameters, Responses
+from livebode.dataclass import dataclass
 from livebode.records import PARAMETER_SCHEMA, parameter_rows
 from livebode.tables import from_numpy, text
 from livebode_plant.fleet.alike_axes import Output, StackedRows

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import quote, urlsplit
 
 from livebode.core import FleetError, on_loopback
+from livebode.dataclass import dataclass
 from livebode.sources.live import FRAME_BYTES_MAX
 from livebode_plant.fleet.fleet_settings import FleetSettings, LeafSection, ServerSection, UsersSection
 from livebode_plant.fleet.status_message import NAMES, VIEW

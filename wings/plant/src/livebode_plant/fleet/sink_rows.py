@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from itertools import pairwise
 from typing import Any, NamedTuple
@@ -14,6 +13,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from livebode.core import LEVELS
+from livebode.dataclass import dataclass
 from livebode.tables import from_numpy, to_numpy
 from livebode_plant.fleet.reader import StoredMessage
 from livebode_plant.fleet.result_message import ResultMessage

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, field, replace
 from datetime import UTC, datetime, timedelta
 from typing import Any, NamedTuple
 
@@ -14,6 +14,7 @@ import pyarrow as pa
 
 from livebode.analysis import FittedQuantities
 from livebode.core import LEVELS, ArchiveError, Responses, SignalError, counted
+from livebode.dataclass import dataclass
 from livebode.fitting import RunningMean
 from livebode.tables import Table
 from livebode_plant.fleet.fleet_settings import SinkSection

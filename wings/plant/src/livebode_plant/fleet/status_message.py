@@ -28,13 +28,13 @@ import json
 import struct
 import zlib
 from collections.abc import Mapping
-from dataclasses import dataclass
 from math import nan
 from typing import TYPE_CHECKING, Any, Final, Literal
 from urllib.parse import urlsplit
 
 import numpy as np
 
+from livebode.dataclass import dataclass
 from livebode_plant.fleet.subjects import axis_path
 
 if TYPE_CHECKING:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import pyarrow as pa
 
 from livebode.core import ArchiveError, DamageWarning
+from livebode.dataclass import dataclass
 from livebode_plant.lake.data_file import JOINED, DataFile, DataFileWriter, small_files
 from livebode_plant.lake.lake import Lake
 from livebode_plant.lake.schemas import TABLES

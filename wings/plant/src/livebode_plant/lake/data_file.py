@@ -7,7 +7,6 @@ import json
 import re
 import time
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from datetime import date
 from pathlib import Path
 from typing import Any, Final, NamedTuple, Self
@@ -18,6 +17,7 @@ import pyarrow.parquet as pq
 from deltalake import CommitProperties, DeltaTable, Transaction
 from deltalake.transaction import AddAction, RemoveAction
 
+from livebode.dataclass import dataclass
 from livebode.tables import text
 from livebode_plant.lake.schemas import TABLES
 from livebode_plant.lake.wide_responses import wide_options

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from datetime import datetime
 from functools import cached_property
 from typing import Any
@@ -13,6 +13,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from livebode.core import Lines, MatrixResponses, PlantKinds, Responses
+from livebode.dataclass import dataclass
 from livebode.records import entry_missing, entry_named, entry_summary, is_matrix, kinds_in, lines_in, steady
 from livebode_plant.lake.data_file import Key
 from livebode_plant.lake.lake import Lake

@@ -8,13 +8,13 @@ Lists have the item name of Delta, "element".
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Final
 
 import pyarrow as pa
 
 from livebode.core import LEVELS
+from livebode.dataclass import dataclass
 from livebode.records import PARAMETER_SCHEMA
 from livebode_plant.lake.wide_responses import covariance_schema, entry_schema, wide_schema
 

@@ -5,11 +5,12 @@ from __future__ import annotations
 import re
 import zlib
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import numpy as np
 
+from livebode.dataclass import dataclass
 from livebode_plant.fleet.status_message import (
     AXIS_STATUS,
     AxisName,

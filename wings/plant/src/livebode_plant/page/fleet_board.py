@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections import OrderedDict
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from math import isfinite
 from typing import Any, get_args
 
@@ -13,6 +13,7 @@ import numpy as np
 
 from livebode.core import ServerError
 from livebode.dashboard import MINUTES_MAX, NAME_MAX, TEXT_MAX, Act, AlarmRequest, AlarmShelf, AlarmState
+from livebode.dataclass import dataclass
 from livebode.language import Message
 from livebode.monitoring import ALARMS
 from livebode_plant.fleet.status_message import ACTIVE, BEHIND, NOT_READY, PRIORITIES, SILENT

@@ -20,7 +20,7 @@ import struct
 import time
 from collections import deque
 from collections.abc import Awaitable, Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import partial
 from pathlib import Path
 from typing import Any, Literal, cast, get_args
@@ -45,6 +45,7 @@ from livebode.dashboard import (
     json_object,
     serve_browser,
 )
+from livebode.dataclass import dataclass
 from livebode.language import Message
 from livebode.records import to_json
 from livebode_plant.page.fleet_board import FleetBoard

@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections import OrderedDict
 from collections.abc import Iterator
-from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from functools import reduce
 from itertools import combinations
@@ -19,6 +18,7 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Floats
 from livebode.core import LEVELS, ServerError
+from livebode.dataclass import dataclass
 from livebode.language import Message
 from livebode_plant.fleet.main_quantity import STIFFNESS
 

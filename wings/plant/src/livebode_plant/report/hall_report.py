@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
 
 from livebode.core import Document, Finding, Paragraph, Picture, PrintedTable, Section, Tone, date_and_time
+from livebode.dataclass import dataclass
 from livebode.language import listed, number, quantity_name, tr, trn, worded
 from livebode_plant.report.trend_words import (
     amount,

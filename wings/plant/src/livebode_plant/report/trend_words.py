@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from datetime import UTC, datetime
 from itertools import pairwise
 from math import isfinite
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Floats
 from livebode.core import with_bound
+from livebode.dataclass import dataclass
 from livebode.language import listed, number, quantity_name, tr, trn
 from livebode.pictures import (
     ABOVE,

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from math import inf, isfinite, nan
 
 import numpy as np
 
 from livebode.arrays import Floats
 from livebode.core import INTERVAL_FACTOR, needing
+from livebode.dataclass import dataclass
 from livebode_plant.trending.quantity_history import History, MachineHistory
 from livebode_plant.trending.robust_fit import rank_of, robust_fit
 from livebode_plant.trending.trend import NotAssessed, Trend

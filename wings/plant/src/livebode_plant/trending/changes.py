@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 from livebode.arrays import Floats
+from livebode.dataclass import dataclass
 from livebode_plant.trending.robust_fit import RobustFit, rank_of, robust_fit
 
 ChangeKind = Literal["jump", "bend"]

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from livebode.arrays import Floats
+from livebode.dataclass import dataclass
 
 START_S = 1_735_689_600.0
 """The first run is after this: 2025-01-01."""

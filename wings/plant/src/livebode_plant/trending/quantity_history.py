@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from datetime import datetime
 
 import numpy as np
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Floats
 from livebode.core import LEVELS, ArchiveError, Level, nearest_name
+from livebode.dataclass import dataclass
 from livebode_plant.lake import Lake
 from livebode_plant.trending.trend import NotAssessed, Trend, trend_of
 

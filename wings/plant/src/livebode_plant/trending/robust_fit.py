@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import lru_cache
 from math import inf
 
@@ -10,6 +9,7 @@ import numpy as np
 
 from livebode.arrays import Floats
 from livebode.core import needing
+from livebode.dataclass import dataclass
 
 with needing("SciPy", "analysis", "a trend"):
     from scipy.fft import dct

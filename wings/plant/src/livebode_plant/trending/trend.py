@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from math import inf, nan, tau
 
 import numpy as np
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Floats
 from livebode.core import INTERVAL_FACTOR
+from livebode.dataclass import dataclass
 from livebode.language import Message
 from livebode_plant.trending.changes import ChangeKind, Segmentation, segmentation
 from livebode_plant.trending.robust_fit import rank_of

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from enum import StrEnum
 from functools import wraps
@@ -14,6 +13,7 @@ import typer
 
 from livebode.cli import console, is_terminal
 from livebode.core import UsageError
+from livebode.dataclass import dataclass
 
 if TYPE_CHECKING:
     from livebode_plant.trending import Selection
