@@ -19,7 +19,7 @@ ROWS_MAX = 8
 _logger = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@dataclass(frozen=True, eq=False)
 class WaitingSpectra:
     """The next spectra of an axis as those of `NewestSpectra`, and its tracker, whose `kind` is not None."""
 
