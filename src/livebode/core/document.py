@@ -78,7 +78,7 @@ class PrintedTable:
 class Picture:
     """A picture that is not drawn yet: its kind, its data, and its caption.
 
-    The kind of a plug-in is "module:function" of what draws it, called with the data and `width_in`.
+    The kind of a plug-in is "module:function" of what makes its `livebode.pictures.Figure`, called with the data.
     """
 
     what: str

@@ -119,7 +119,7 @@ def _not_a_trial(part: str) -> UsageError:
 
 
 _TIMES = 200
-_BANDWIDTHS = 3.0  # shown time times the lower bandwidth, as in tune.png
+_BANDWIDTHS = 3.0  # shown time times the lower bandwidth, as in tune.svg
 _LOWEST = 1e-2  # of the lowest line: the lowest bandwidth for which the time is chosen
 
 
