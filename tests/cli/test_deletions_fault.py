@@ -68,7 +68,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ("design", made / "experiment.toml", "--out", made / "design"),
         ("plc", made / "axis.toml", "--limit", 4, "--amplitude", 1, "--rate", 1000, "--out", made / "plc"),
     ):
-        done = livebode(*arguments, pictures=arguments[0] == "design")
+        done = livebode(*arguments)
         assert done.code == 0, done.err
     archive = write_archive(made / "lake", 2)
     archive.write_text(archive.read_text().replace('lake = "lake"', 'lake = "."'))

@@ -11,8 +11,10 @@ from typing import Any
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from pydantic import BaseModel, ValidationError
 
-from livebode.configuration import Axis, LimitSection, LoopSection, MachineSection, MonitoringSection
+from livebode.configuration import Axis, File, LimitSection, LoopSection, MachineSection, MonitoringSection
+from livebode.configuration.section import Language, Positive
 from livebode.core import TypedTable
 from livebode.core.typed_table import fields_of
 from livebode.core.typed_table_model import model_of, validated
@@ -136,3 +138,19 @@ def test_lists_of_defaults_are_not_shared() -> None:
 def test_run_json_is_checked_with_its_further_keys() -> None:
     table: type[TypedTable] = _AnySummary
     assert table.model_validate({"counts": {"samples": 3}, "more": [1]}).model_fields_set == {"counts"}
+
+
+class _Settings(BaseModel, strict=True):
+    """The settings of a plug-in, by pydantic alone."""
+
+    file: File
+    rate_hz: Positive = 1.0
+    language: Language = "en"
+
+
+def test_a_model_of_a_plugin_may_have_types_of_ours() -> None:
+    settings = _Settings.model_validate({"file": "recipe.toml", "rate_hz": 2.0, "language": "de"})
+    assert settings == _Settings(file=Path("recipe.toml"), rate_hz=2.0, language="de")
+    for wrong in ({"file": 3}, {"file": "a", "rate_hz": 0.0}, {"file": "a", "language": "xx"}):
+        with pytest.raises(ValidationError):
+            _Settings.model_validate(wrong)

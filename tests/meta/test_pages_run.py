@@ -92,7 +92,7 @@ def test_what_a_page_shows_runs_with_files_of_the_examples_and_its_own(
     for step in steps_of(page):
         if step.reason or step.text in ("livebode example all", "cd example"):
             continue
-        own |= run(step, desk, names, pictures=name == "docs/reference/run-directory.md")
+        own |= run(step, desk, names)
         missing = {path for path in named(step, desk.folder) if path not in own}
         assert not missing, f"{step.text}\nuses {missing}, which neither an example nor this page creates"
 

@@ -39,7 +39,7 @@ def test_a_command_of_the_page_runs_and_gives_the_gain_of_the_machine(
 ) -> None:
     monkeypatch.chdir(folder)
     words = shlex.split(command)
-    result = livebode(*words, pictures=words[1] == "axis.parquet")
+    result = livebode(*words)
     assert (result.code, result.err) == (0, "")
     for name in words[3::2] if words[0] == "inspect" else ():
         assert name in result.out

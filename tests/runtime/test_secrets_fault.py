@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
@@ -73,4 +74,4 @@ def test_options_hold_no_secret_either(tmp_path: Path) -> None:
     (tmp_path / "axis.toml").write_text(f'[source]\nurl = "mqtt://h/t"\npassword_file = "p"{ONE_LINE_DIRECT}')
     (tmp_path / "p").write_text(SECRET)
     axis = ConfigurationFile(tmp_path / "axis.toml", {}).read()[""]
-    assert SECRET not in repr(axis) + axis.model_dump_json()
+    assert SECRET not in repr(axis) + json.dumps(axis.model_dump(mode="json"))

@@ -60,8 +60,7 @@ def _standard(kind: Any) -> Any:
     if origin is Annotated:
         found = _standard(arguments[0])
         for each in kind.__metadata__:
-            for one in _annotations(each):
-                found = Annotated[found, one]
+            found = annotated(found, each)
         return found
     if origin in (Union, UnionType):
         return Union[tuple(map(_standard, arguments))]  # noqa: UP007 - of a tuple
@@ -70,14 +69,16 @@ def _standard(kind: Any) -> Any:
     return kind
 
 
-def _annotations(given: Any) -> list[Any]:
+def annotated(kind: Any, given: Any) -> Any:
+    """The type with what pydantic reads in place of one of our specifications."""
     if isinstance(given, Specification):
-        return [Field(**given.limits)]
+        return Annotated[kind, Field(**given.limits)]
     if isinstance(given, ValueCheck):
-        return [AfterValidator(given.function)]
+        return Annotated[kind, AfterValidator(given.function)]
     if isinstance(given, Conversion):
-        return [PlainValidator(given.function), WithJsonSchema({"type": "string", "format": given.format})]
-    return [given]
+        form = WithJsonSchema({"type": "string", "format": given.format})
+        return Annotated[kind, PlainValidator(given.function), form]
+    return Annotated[kind, given]
 
 
 def _of_model(table: Any, model: Any) -> Any:

@@ -7,7 +7,9 @@ from collections.abc import Callable, Mapping
 from math import isfinite
 from pathlib import Path
 from types import NoneType, UnionType
-from typing import Annotated, Any, Literal, NamedTuple, Union, get_args, get_origin
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
+
+from livebode.dataclass import dataclass
 
 REQUIRED = object()
 """The default of a key that has none."""
@@ -29,24 +31,37 @@ class NotPlainError(ValueError):
     """A value that is wrong, or about which pydantic has to decide."""
 
 
+def _for_pydantic(given: Any, source: Any, handler: Any) -> Any:
+    """How a model of pydantic, as plug-ins have, understands what a type of ours says."""
+    from livebode.core.typed_table_model import annotated
+
+    return handler.generate_schema(annotated(source, given))
+
+
 class Specification:
     """Default and alias of a key, or limits in a type, as of pydantic's `Field`."""
+
+    __get_pydantic_core_schema__ = _for_pydantic
 
     def __init__(self, *, default: Any = REQUIRED, alias: str | None = None, **limits: Any) -> None:
         self.default, self.alias, self.limits = default, alias, limits
 
 
-class ValueCheck(NamedTuple):
+@dataclass(frozen=True)
+class ValueCheck:
     """A function that checks and may change a value of the type before it, as of pydantic's `AfterValidator`."""
 
     function: Callable[[Any], Any]
+    __get_pydantic_core_schema__ = _for_pydantic
 
 
-class Conversion(NamedTuple):
+@dataclass(frozen=True)
+class Conversion:
     """A function that makes a value from anything, as of pydantic's `PlainValidator`; `format` of its text."""
 
     function: Callable[[Any], Any]
     format: str
+    __get_pydantic_core_schema__ = _for_pydantic
 
 
 def plain_value(kind: Any, value: Any, lax: bool = False) -> Any:
