@@ -86,7 +86,6 @@ def named(step: Step, folder: Path) -> set[Path]:
 def test_what_a_page_shows_runs_with_files_of_the_examples_and_its_own(
     page: Path, desk: Desk, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    name = str(page.relative_to(ROOT))
     monkeypatch.chdir(desk.folder)
     own, names = set(desk.examples), {"__name__": "page"}
     for step in steps_of(page):
