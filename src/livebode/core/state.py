@@ -119,26 +119,30 @@ def encode(stage: Stage, values: Mapping[str, Any], identity: str = "") -> bytes
     >>> decode(stage, data)
     {'count': 2, 'mean': array([0.5, nan])}
     """
-    plain, arrays, parts = {}, {}, {}
+    plain: dict[str, Any] = {}
+    form: list[tuple[str, np.dtype[Any], tuple[int, ...]]] = []
+    lengths: list[tuple[str, int]] = []
+    arrays: list[memoryview] = []
+    parts: list[bytes] = []
     for name, value in values.items():
         if isinstance(value, np.ndarray):
-            arrays[name] = _little_endian(value)
-        elif isinstance(value, StatefulBase):
-            parts[name] = value.snapshot()
-        elif isinstance(value, bytes):
-            parts[name] = value
+            array = _little_endian(value)
+            form.append((name, array.dtype, array.shape))
+            if array.size:
+                arrays.append(array.data)
+        elif isinstance(value, StatefulBase | bytes):
+            part = value if isinstance(value, bytes) else value.snapshot()
+            lengths.append((name, len(part)))
+            parts.append(part)
         else:
             plain[name] = value
-    form = tuple((name, array.dtype, array.shape) for name, array in arrays.items())
-    text = (
-        f"{_begin(stage.name, identity)}{_to_json(plain) if plain else '{}'}"
-        f"{_arrays(form)}{_parts(tuple((name, len(part)) for name, part in parts.items()))}"
-    ).encode()
+    content = f"{_to_json(plain) if plain else '{}'}{_arrays(tuple(form))}{_parts(tuple(lengths))}"
+    text = f"{_begin(stage.name, identity)}{content}".encode()
     check = zlib.crc32(text)
-    for array in arrays.values():
-        check = zlib.crc32(array.data, check) if array.size else check
+    for data in arrays:
+        check = zlib.crc32(data, check)
     head = _HEAD.pack(_MAGIC, ENCODING, stage.version, len(text), check)
-    return b"".join([head, _CHECK.pack(zlib.crc32(head)), text, *(a.data for a in arrays.values()), *parts.values()])
+    return b"".join([head, _CHECK.pack(zlib.crc32(head)), text, *arrays, *parts])
 
 
 def decode(stage: Stage, data: bytes, identity: str = "") -> dict[str, Any]:

@@ -53,8 +53,9 @@ class PlausibleRange(StatefulBase):
     def _found(self, data: Floats, every: Floats) -> list[NDArray[np.intp]]:
         """Implausible samples, in pieces that begin a period, or continue the one that has begun."""
         every[:, 0] = np.maximum(self._largest, every[:, 0])
-        limits = np.empty(every.shape)
-        limits[:, 0], limits[:, 1:] = self._limit, _limits(every[:, :-1])
+        limits = self._limit[:, np.newaxis]
+        if every.shape[1] > 1:
+            limits = np.concatenate([limits, _limits(every[:, :-1])], axis=1)
         if not (every > limits).any():  # nearly always
             self._largest, self._limit = every[:, -1].copy(), limits[:, -1].copy()
             return []

@@ -165,10 +165,11 @@ class RepeatingErrors(PeriodCutter):
         aside
             Positions of the samples that are set aside.
         """
-        left_out = np.concatenate([rows.not_finite, rows.implausible, rows.spikes, rows.left_out, aside])
+        left_out = [one for one in (rows.not_finite, rows.implausible, rows.spikes, rows.left_out, aside) if one.size]
+        cut = self._cut(data, schedule, np.concatenate(left_out) if left_out else aside)
         which = (rows.sample - block.start + self._at) // self._window  # so many periods end before
         kind = next((c.stated_kind for c in block.channels if c.name == self._settings.output), None)
-        begun, verdicts = self._now, [self._verdicts(p, block, kind) for p in self._cut(data, schedule, left_out)]
+        begun, verdicts = self._now, [self._verdicts(periods, block, kind) for periods in cut]
         if not verdicts:
             now = begun.distortion[np.newaxis], np.logical_or.reduce(begun.against, axis=0, keepdims=True)
         elif len(verdicts) == 1:

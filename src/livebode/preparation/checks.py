@@ -40,9 +40,12 @@ class ChannelCheck(StatefulBase):
             if max(len(self._waiting), len(block)) >= _TOGETHER:
                 self._take_waiting()
             return
-        x = block[self._reference]
-        x = x[np.isfinite(x)]
-        self._moments += x.size, x.sum(), np.dot(x, x)
+        x = np.ascontiguousarray(block[self._reference])
+        squares = np.dot(x, x)
+        if not np.isfinite(squares):  # hardly ever
+            x = x[np.isfinite(x)]
+            squares = np.dot(x, x)
+        self._moments += x.size, x.sum(), squares
         for name, value in list(self._unvaried.items()):
             finite = block[name][np.isfinite(block[name])]
             if not finite.size:
