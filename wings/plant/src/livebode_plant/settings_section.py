@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Self, get_args
+from typing import Any, Self, get_args
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, ValidationError
 
 from livebode.configuration import one_line, read_table, shortened
 from livebode.core import ConfigError, nearest_name
-
-File = Annotated[Path, Field(strict=False)]
 
 
 class SettingsSection(BaseModel):

@@ -11,10 +11,10 @@ from urllib.parse import urlsplit
 
 from pydantic import Field
 
-from livebode.configuration import Axis, Schema, read_table, schema_of, tables_of
+from livebode.configuration import Axis, File, Schema, read_table, schema_of, tables_of
 from livebode.core import LEVELS, ConfigError, on_loopback
 from livebode.dataclass import dataclass
-from livebode_plant.settings_section import File, SettingsFile, SettingsSection, place_beside
+from livebode_plant.settings_section import SettingsFile, SettingsSection, place_beside
 
 _PARTS = re.compile(r"\*\*/|\*|\?|\{(\w*)\}")
 _WILD = {"**/": "(?:.*/)?", "*": "[^/]*", "?": "[^/]"}

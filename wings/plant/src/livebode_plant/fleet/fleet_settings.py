@@ -10,10 +10,10 @@ from urllib.parse import urlsplit
 
 from pydantic import Field
 
-from livebode.configuration import Axis, ConfigurationFile
+from livebode.configuration import Axis, ConfigurationFile, File
 from livebode.core import ConfigError, FleetError, on_loopback
 from livebode_plant.fleet.subjects import axis_key
-from livebode_plant.settings_section import File, SettingsFile, SettingsSection, place_beside
+from livebode_plant.settings_section import SettingsFile, SettingsSection, place_beside
 
 PARTITIONS_MAX = 1024
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
