@@ -1,11 +1,9 @@
-"""`python -m bench.start`: what the command line costs before it does anything, in the cost of Python's own start; and
-the commands on a recording of two seconds.
+"""`python -m bench.start`: what the command line costs before it does anything, in the cost of Python's own start.
 
 Processor time, user and system, of a child process with bytecode, as installed; the median of 20, the programs in
 turn. What prints help or an error, or completes, loads Typer and nothing else that is large; Typer alone is the bound
-of these rows. A wrong value costs more: Typer converts it by pydantic.
-
-    python -m bench.start --commands    # run, fit, report, export, inspect and doctor alone; the least of each
+of these rows. A wrong value costs more: Typer converts it by pydantic. `python -m bench.felt commands` has the
+commands at work.
 """
 
 from __future__ import annotations
@@ -42,36 +40,9 @@ TARGETS = {
     **dict.fromkeys(("livebode rn (a wrong command)", "livebode run --no (a wrong option)"), 10.0),
     **dict.fromkeys(("livebode run --help", "livebode report --help"), 10.0),
 }
-WORK_S = {"run": 0.45, **dict.fromkeys(("fit", "report", "export", "inspect", "doctor"), 0.5)}
-
-
-def commands(processes: Processes, folder: Path) -> None:
-    """Print the least processor time of the commands on a recording of two seconds."""
-    processes.run(LIVEBODE, "example", "standstill", "--out", str(folder))
-    log, run = str(folder / "standstill.csv"), str(folder / "run")
-    signals = ("--excitation", "w", "--input", "u", "--output", "velocity")
-    work = {
-        "run": ("run", log, *signals, "--out", run, "--force"),
-        "fit": ("fit", run),
-        "report": ("report", run),
-        "export": ("export", run, "--sql", "SELECT count(*) FROM responses"),
-        "inspect": ("inspect", log),
-        "doctor": ("doctor",),
-    }
-    least = dict.fromkeys(work, float("inf"))
-    for _ in range(ROUNDS // 2):
-        for name, words in work.items():
-            least[name] = min(least[name], processes.run(LIVEBODE, *words)[0])
-    for name, seconds in least.items():
-        verdict = "met" if seconds <= WORK_S[name] else "missed"
-        print(f"livebode {name:31}{1e3 * seconds:8.0f} ms   target ≤ {1e3 * WORK_S[name]:.0f} ms: {verdict}")
 
 
 def main() -> None:
-    if "--commands" in sys.argv:
-        with tempfile.TemporaryDirectory() as name:
-            commands(Processes(Path(name) / "bytecode"), Path(name))
-        return
     times: dict[str, list[float]] = {name: [] for name in PROGRAMS}
     with tempfile.TemporaryDirectory() as folder:
         processes = Processes(Path(folder))

@@ -14,7 +14,8 @@ from livebode.configuration import Axis
 from livebode.core import NOT_WHOLE, SPIKE, Channel, Event, Responses, Spectra, SpectraLayout
 from livebode.estimation import SpectraTracker
 from livebode.preparation import live_follower
-from livebode.runtime.joining import ROWS_MAX, WaitingSpectra, track_together
+from livebode.runtime.joining import WaitingSpectra, track_together
+from livebode.runtime.single_response import ROWS_MAX
 
 RATE_HZ, WINDOW, HOP, LINES = 4000.0, 100, 25, (2, 4, 6, 8, 10)
 SIGNALS = Channel("y", "rad/s"), Channel("other"), Channel("u", "N m"), Channel("w", "N m")

@@ -12,7 +12,7 @@ import signal
 import sys
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import nullcontext
+from contextlib import AbstractContextManager, nullcontext
 from functools import partial
 from typing import Any, cast
 
@@ -26,7 +26,7 @@ from livebode.cli.next_step import NextCommand
 from livebode.cli.plain_values import LeftToTyperError, plain_value
 from livebode.cli.remote import with_copies
 from livebode.cli.terminal import print_page, protect
-from livebode.core import DamageWarning, LivebodeError, needing
+from livebode.core import DamageWarning, LivebodeError
 from livebode.plugins import PluginWarning, loaded, named, wings_left_out
 from livebode.version import __version__
 
@@ -104,7 +104,11 @@ class _Command(_Light, TyperCommand):
         """Run the command; an error names the options that it concerns."""
         group = ctx.parent.command if ctx.parent else None
         extra = group.extra if isinstance(group, _Group) else ""
-        arrow = needing("PyArrow", extra, f"the command {group.name}") if group and extra else nullcontext()
+        arrow: AbstractContextManager[None] = nullcontext()
+        if group and extra:
+            from livebode.core import needing
+
+            arrow = needing("PyArrow", extra, f"the command {group.name}")
         module = self.callback.__module__ if self.callback else __name__
         try:
             with arrow, logged(ctx.info_name, module, ctx.obj):

@@ -26,11 +26,11 @@ from livebode.cli.options import parsed_band
 from livebode.cli.pictures import draw, tracked_amount
 from livebode.cli.remote import recorded_at
 from livebode.cli.shell import command_line
-from livebode.configuration import Axes, Axis, ConfigurationFile, ServeSection
+from livebode.configuration import Axis, ServeSection
 from livebode.core import ConfigError, LocationError, RecordError, UsageError
 from livebode.estimates import RESPONSE, rule
 from livebode.locations import Location, Url, local_copy, location, original
-from livebode.records import check_removable, is_run, to_json
+from livebode.records import is_run, to_json
 from livebode.runtime import (
     Destination,
     Document,
@@ -47,6 +47,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from livebode.cli.serving import SubscribersOf
+    from livebode.configuration import Axes, ConfigurationFile
     from livebode.publishing import Publisher
 
 
@@ -144,6 +145,8 @@ def _check_places(directory: Path, axes: Axes, *, force: bool) -> None:
         )
     for place in (directory / name for name in axes):
         if force and os.path.lexists(place):
+            from livebode.records import check_removable
+
             check_removable(place)
 
 
@@ -182,6 +185,8 @@ def _file(target: Location, over: Mapping[str, Mapping[str, Any]]) -> Configurat
             "copy it to this computer; the recordings that it names may be at URLs",
             path=str(target),
         )
+    from livebode.configuration import ConfigurationFile
+
     return ConfigurationFile(target, over)
 
 

@@ -113,12 +113,9 @@ def packages_of(extra: str, requires: Sequence[str]) -> list[Requirement]:
     ['b', 'c']
     """
     packages = []
-    for requirement in map(_requirement, requires):
-        if (
-            requirement.marker is None
-            or requirement.marker.evaluate({"extra": ""})
-            or not requirement.marker.evaluate({"extra": extra})
-        ):
+    for line in requires:
+        requirement = _optional(line)
+        if requirement is None or requirement.marker is None or not requirement.marker.evaluate({"extra": extra}):
             continue
         if requirement.name == "livebode":
             packages += [package for inner in sorted(requirement.extras) for package in packages_of(inner, requires)]
@@ -128,10 +125,12 @@ def packages_of(extra: str, requires: Sequence[str]) -> list[Requirement]:
 
 
 @cache  # each extra is looked up in all lines
-def _requirement(line: str) -> Requirement:
+def _optional(line: str) -> Requirement | None:
+    """The requirement; None if it is needed without an extra too."""
     from packaging.requirements import Requirement
 
-    return Requirement(line)
+    requirement = Requirement(line)
+    return None if requirement.marker is None or requirement.marker.evaluate({"extra": ""}) else requirement
 
 
 def _packages(requires: list[str], extras: tuple[str, ...]) -> list[str]:

@@ -75,12 +75,18 @@ PLUGINS = "plug-ins"
 
 
 def check_plugins() -> Check:
-    """The tables of other packages; each is loaded, but not the parts that it names."""
+    """The tables of other packages; each is loaded, but not the parts that it names.
+
+    livebode's own are loaded, for the names in them, where another package adds to their group.
+    """
     groups_of: dict[str, list[str]] = {}
     problems: list[str] = []
     for group in GROUPS:
         known: set[str] = set()
-        for plugin in plugins(group):
+        declared = plugins(group)
+        if all(plugin.is_own for plugin in declared):
+            continue
+        for plugin in declared:
             if not plugin.is_own:
                 groups_of.setdefault(f"{plugin.package} {plugin.version}", []).append(group)
             try:

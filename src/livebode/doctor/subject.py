@@ -20,7 +20,6 @@ from livebode.core import ConfigError, LivebodeError, UsageError
 from livebode.dataclass import dataclass
 from livebode.estimates import rule
 from livebode.plugins import loaded
-from livebode.preparation import live_follower
 from livebode.records import RunRecord
 
 
@@ -131,6 +130,8 @@ def _problem_of(axis: Axis) -> LivebodeError | None:
             if axis.monitoring.gantry is not None:
                 rule(axis.kind, "machine")(axis.monitoring.gantry)
         if axis.source.url is not None and axis.source.rate_hz is not None:
+            from livebode.preparation import live_follower
+
             live_follower(axis, axis.source.rate_hz)
     except LivebodeError as error:
         return error

@@ -14,7 +14,6 @@ from livebode.core import Channel, Event, PlantKinds, Responses, SourceUnit, Sta
 from livebode.estimation.detection import DetectionNoise, beyond
 from livebode.estimation.implausible import FACTOR, PlausibleRange
 from livebode.estimation.movement import Movement
-from livebode.estimation.periodicity import Periodicity
 from livebode.estimation.periods import PeriodMoments
 from livebode.estimation.products import power, times
 from livebode.estimation.quantities import LineEstimates
@@ -74,6 +73,8 @@ class LineStage(StatefulBase):
         self._movement = Movement(self._places)
         self._periodicity = None
         if settings.method.reference == "input":
+            from livebode.estimation.periodicity import Periodicity
+
             name = settings.input or ""
             self._periodicity = Periodicity(lines, self._places, name, self._events)
         self._moving = 0

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
 from math import nan
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from livebode.core import Event, RunClock, UsageError, moment, moments_by, needing
 from livebode.dataclass import dataclass
@@ -14,11 +14,16 @@ from livebode.records.confined_sql import QueryResult, QueryTables, answer_query
 from livebode.records.grouped_events import each_event, event_rows
 from livebode.records.json_format import to_json
 from livebode.records.run import RunRecord
-from livebode.records.segments.manifest import TIERS
-from livebode.records.segments.verified_files import segment_groups
+from livebode.records.segments.manifest import TIERS, Segment
+from livebode.records.segments.reading import segment_rows
+from livebode.tables import Table
 
 with needing("PyArrow", "query", "a query"):
     import pyarrow as pa
+with needing("nanoarrow", "query", "a query"):
+    import nanoarrow as na
+
+if TYPE_CHECKING:
     import pyarrow.dataset as ds
 
 _TABLES = ("responses", "covariance", "parameters", "samples", *TIERS)
@@ -32,6 +37,7 @@ _SINGLE_EVENTS = pa.schema(
         ("details", pa.string()),
     ]
 )
+_AT_ONCE_BYTES = 32 << 20  # of the one file of a table: to read all of it costs less than to load Arrow's data sets
 _NEVER_MISSING = ("time_s", "frequency_hz")  # as plain columns, so that conditions on them reach the files
 _COUNTS = [("count", pa.int64()), ("first_s", pa.float64()), ("last_s", pa.float64())]
 _EVENTS = pa.schema([*_SINGLE_EVENTS, *_COUNTS])
@@ -109,9 +115,9 @@ def _show(run: RunRecord, database: Any, asked: set[str], damages: list[Event]) 
     lines = list(run.each_event_and_damage())
     clock = run.clock
     rows = [_plain(row.newest, clock) | vars(row) for row in event_rows(lines)]
-    database.register("events", pa.Table.from_pylist(rows, schema=_EVENTS))
+    database.register("events", _of_rows(rows, _EVENTS))
     each = [_plain(one, clock) for event in lines for one in each_event(event)]
-    database.register("single_events", pa.Table.from_pylist(each, schema=_SINGLE_EVENTS))
+    database.register("single_events", _of_rows(each, _SINGLE_EVENTS))
     return set(tables) - shown.keys()
 
 
@@ -129,10 +135,31 @@ def _parts_of(run: RunRecord, tables: list[str], damages: list[Event]) -> dict[s
     segments, rows = run.parts()
     parts: dict[str, list[_Part]] = {}
     for table in tables:
-        groups = segment_groups(run.path, [segment for segment in segments if segment.table == table], damages)
-        parts[table] = [_Part(group.rows, group.first_s, group.last_s) for group in groups]
-        parts[table] += [_Part(pa.table(batch)) for batch in rows.get(table, ())]
+        parts[table] = _closed(run, [segment for segment in segments if segment.table == table], damages)
+        parts[table] += [_Part(_in_arrow(batch)) for batch in rows.get(table, ())]
     return {table: of_table for table, of_table in parts.items() if of_table}
+
+
+def _closed(run: RunRecord, segments: list[Segment], damages: list[Event]) -> list[_Part]:
+    """The segments of a table: a single one, as of a finished run, at once; of several those that a query needs."""
+    if not segments:
+        return []
+    if len(segments) == 1 and segments[0].size_bytes <= _AT_ONCE_BYTES:
+        intact = list(segment_rows(run.path, segments[0], damages.append))
+        return [_Part(_in_arrow(Table.join(intact)), segments[0].first_s, segments[0].last_s)] if intact else []
+    from livebode.records.segments.verified_files import segment_groups  # with pandas, where it is installed
+
+    return [_Part(group.rows, group.first_s, group.last_s) for group in segment_groups(run.path, segments, damages)]
+
+
+def _in_arrow(stream: Any) -> pa.Table:
+    """The table of a stream: `pa.table` imports pandas where it is installed."""
+    return pa.RecordBatchReader.from_stream(stream).read_all()
+
+
+def _of_rows(rows: list[dict[str, Any]], schema: pa.Schema) -> pa.Table:
+    columns = [na.c_array([row[field.name] for row in rows], field.type) for field in schema]
+    return _in_arrow(na.c_array_stream(na.c_array_from_buffers(schema, len(rows), [None], 0, children=columns)))
 
 
 def _plain(event: Event, clock: RunClock) -> dict[str, Any]:

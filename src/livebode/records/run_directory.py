@@ -12,10 +12,8 @@ from typing import Any
 from livebode.core import Event, RecordError, whole_directory, writing
 from livebode.records._result_rows import RESPONSE_TABLES, result_rows
 from livebode.records.column_table import ColumnTable
-from livebode.records.removal import check_removable, remove
 from livebode.records.segments import manifest
 from livebode.records.segments.json_lines import EVENTS, to_line
-from livebode.records.segments.lock import Lock
 from livebode.records.segments.manifest import Segment
 from livebode.records.segments.segment_writer import TableFile
 from livebode.records.summary_file import COPY, RUN, to_document
@@ -51,7 +49,7 @@ class RunDirectory:
     def __enter__(self) -> RunDirectory:
         self._check_free()
         with writing(self.path, RecordError), contextlib.ExitStack() as undo:
-            self.partial = undo.enter_context(whole_directory(self.path, remove))
+            self.partial = undo.enter_context(whole_directory(self.path, _remove))
             self._events = (self.partial / EVENTS).open("wb")
             self._files: dict[str, TableFile] = {}
             for name in self._tables:
@@ -126,6 +124,16 @@ class RunDirectory:
                 path=str(self.path),
                 argument="force",
             )
+        from livebode.records.removal import check_removable
+
         check_removable(self.path)
         if segments:
+            from livebode.records.segments.lock import Lock
+
             Lock(self.path).release()
+
+
+def _remove(directory: Path) -> None:
+    from livebode.records.removal import remove
+
+    remove(directory)

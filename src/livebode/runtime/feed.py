@@ -8,11 +8,11 @@ from contextlib import AbstractContextManager, nullcontext
 from typing import TYPE_CHECKING, Any, Protocol
 
 from livebode.core import Block, Channel, Emit, Event
-from livebode.runtime.joining import Steps
 from livebode.runtime.run_control import RunControl
 
 if TYPE_CHECKING:
     from livebode.runtime.continuing import PreviousRun, StreamPosition
+    from livebode.runtime.joining import Steps
     from livebode.runtime.recorder import Recorder
     from livebode.runtime.shedding import LoadShedding
     from livebode.sources.live import LiveSource

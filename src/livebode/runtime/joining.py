@@ -14,8 +14,6 @@ from livebode.core import Responses
 from livebode.dataclass import dataclass
 from livebode.estimation import NewestSpectra, SpectraTracker
 
-ROWS_MAX = 8
-"""A Block with more spectra is not joined: its own spectra are together already."""
 _logger = logging.getLogger(__name__)
 
 

@@ -26,13 +26,13 @@ from livebode.runtime.documents import (
 )
 from livebode.runtime.estimate import Estimate, Outcome, RunContext
 from livebode.runtime.feed import Feed
-from livebode.runtime.joining import Steps, WaitingSpectra
 from livebode.runtime.recorder import Destination, WholeRecord
 from livebode.runtime.run_control import StoppedError
 from livebode.runtime.run_counts import EventGroups, RunCounts
 from livebode.sources.live import KINDS
 
 if TYPE_CHECKING:
+    from livebode.runtime.joining import Steps, WaitingSpectra
     from livebode.runtime.recorder import Recorder
 
 

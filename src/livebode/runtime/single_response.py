@@ -16,7 +16,7 @@ from livebode.analysis import LIVE_VALUES_MAX, Overview
 from livebode.configuration import Axis
 from livebode.core import INTERVAL_FACTOR, Block, Channel, Event, Lines, LivebodeError, Response, Responses, Stateful
 from livebode.dataclass import dataclass
-from livebode.estimation import Follower, Settings, SpectraTracker, plant_kinds
+from livebode.estimation import Follower, Settings, plant_kinds
 from livebode.language import Message
 from livebode.preparation import check_excitation, check_some_valid
 from livebode.records import RESPONSE_TABLES
@@ -30,15 +30,18 @@ from livebode.runtime.estimate import (
     RunContext,
     check_channels,
 )
-from livebode.runtime.joining import ROWS_MAX, WaitingSpectra
 
 if TYPE_CHECKING:
     from livebode.core import Parameters
     from livebode.fitting import Drift, DriftTest, Fit, RecordingsMean
     from livebode.runtime.fits import Fits
+    from livebode.runtime.joining import WaitingSpectra
     from livebode.runtime.live_checks import LiveChecks
     from livebode.runtime.readiness import Readiness
     from livebode.sources.live import LiveSource
+
+ROWS_MAX = 8
+"""The spectra of a Block with more are not joined with those of other axes: they are together already."""
 
 
 def of_drift(drift: Drift, lines: Lines) -> dict[str, Any]:
@@ -302,9 +305,12 @@ class SingleResponse(Estimate):
                 yield from self.detection.take_samples(part)
 
     def waiting_spectra(self, block: Block) -> WaitingSpectra | None:
-        if self.readiness is not None or not isinstance(self.follower, SpectraTracker):
+        if self.readiness is not None or len(block) > ROWS_MAX:
             return None
-        if len(block) > ROWS_MAX or (spectra := self.follower.usual(block)) is None:
+        from livebode.estimation import SpectraTracker
+        from livebode.runtime.joining import WaitingSpectra
+
+        if not isinstance(self.follower, SpectraTracker) or (spectra := self.follower.usual(block)) is None:
             return None
         return WaitingSpectra(self.follower, spectra)
 

@@ -8,16 +8,17 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, field
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from livebode.core import Event, RecordError
 from livebode.dataclass import dataclass
 from livebode.records.inside import read_bytes
 from livebode.records.json_format import VERSIONS, check_version, format_of
-from livebode.records.segments import journal
-from livebode.records.segments.damage import Damage, event_of
-from livebode.records.segments.journal import Journal
 from livebode.records.segments.json_lines import in_line, to_line
+
+if TYPE_CHECKING:
+    from livebode.records.segments.damage import Damage
+    from livebode.records.segments.journal import Journal
 
 NAME = "manifest.jsonl"
 TIERS = ("responses_1s", "responses_1min", "responses_1h")
@@ -102,6 +103,8 @@ class Retained:
 
     @classmethod
     def of(cls, number: int, values: Mapping[str, Any]) -> Retained:
+        from livebode.records.segments.damage import Damage  # a finished run has none
+
         return cls(number, int(values["size_bytes"]), tuple(Damage.of(place) for place in values["places"]))
 
     @classmethod
@@ -109,11 +112,16 @@ class Retained:
         """None if it is intact."""
         if not read.damages:
             return None
+        from livebode.records.segments import journal
+
         return cls(number, (run / journal.name_of(number)).stat().st_size, tuple(read.damages))
 
     @property
     def event(self) -> Event:
         """The event that reports it."""
+        from livebode.records.segments import journal
+        from livebode.records.segments.damage import event_of
+
         return event_of(journal.name_of(self.number), self.damages, journal.set_aside_name(self.number))
 
 

@@ -4,50 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, FiniteFloat, PositiveFloat, ValidationError
 
-from livebode.configuration import LoopSection
 from livebode.core import LivebodeError, RecordError, write_whole
 from livebode.records import read_bytes, to_json
-from livebode_control.tuning import ControllerProposal, LoopSpecification
+
+if TYPE_CHECKING:
+    from livebode.configuration import LoopSection
+    from livebode_control.proposal.tune_file import StoredProposal
+    from livebode_control.tuning import ControllerProposal
 
 _FILE = "tune.json"
 _BYTES_MAX = 1 << 20
 _SAME = 1e-3  # of each value: another processor rounds differently
-
-
-class StoredNotch(BaseModel):
-    """A notch of a proposal."""
-
-    frequency_hz: PositiveFloat
-    depth_db: FiniteFloat
-    damping: PositiveFloat
-
-
-class StoredProposal(BaseModel):
-    """What was asked for, and the controller and the filters that were proposed.
-
-    Attributes
-    ----------
-    specification, loop, entry
-        What `livebode tune` was called with.
-    controller
-        Its parameters.
-    notches, low_passes_hz
-        Filters in series with the innermost controller.
-    """
-
-    model_config = ConfigDict(allow_inf_nan=False)
-
-    specification: LoopSpecification
-    controller: dict[str, Any]
-    notches: list[StoredNotch]
-    low_passes_hz: list[PositiveFloat]
-    loop: LoopSection | None = None
-    entry: str | None = None
 
 
 def store_proposal(proposal: ControllerProposal, directory: Path, loop: LoopSection | None, entry: str | None) -> None:
@@ -67,6 +38,10 @@ def stored_proposal(directory: Path) -> StoredProposal | None:
     """
     if not (directory / _FILE).exists():
         return None
+    from pydantic import ValidationError
+
+    from livebode_control.proposal.tune_file import StoredProposal  # with pydantic
+
     try:
         return StoredProposal.model_validate_json(read_bytes(directory, _FILE, _BYTES_MAX))
     except (OSError, ValidationError, LivebodeError):
