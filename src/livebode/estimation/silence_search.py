@@ -92,9 +92,11 @@ class SilenceSearch(StatefulBase):
             self._newest, self._later = float(excitation[-1]), False
             return
         before = before if np.isfinite(before) else excitation[0]
-        silent = np.diff(excitation, prepend=before) == 0
+        silent = np.empty(excitation.size, dtype=np.bool_)
+        silent[0] = excitation[0] == before
+        np.equal(excitation[1:], excitation[:-1], out=silent[1:])
         at = np.flatnonzero(silent)
-        silent[at] = np.isfinite(data[:, at]).all(axis=0)
+        silent[at] = np.isfinite(data[:, at]).all(axis=0) & np.isfinite(excitation[at])
         silent[aside] = False
         self._newest = float(excitation[-1])
         edges = np.flatnonzero(np.diff(np.concatenate([[False], silent, [False]]).astype(np.int8))).reshape(-1, 2)

@@ -231,14 +231,5 @@ def signals_of(block: Block, settings: Settings) -> tuple[Floats, Floats | None]
         )
     if not len(block):
         raise SignalError("empty", "the block is empty", "leave it out")
-    data = _rows(block.data, [block.index(settings.channel(role) or "") for role in settings.roles])
+    data = block.rows([settings.channel(role) or "" for role in settings.roles])
     return data, block[settings.schedule] if settings.schedule else None
-
-
-def _rows(data: Floats, which: list[int]) -> Floats:
-    """Rows of these channels; no copy where they are evenly spaced, as three channels in the usual orders are."""
-    first, step = which[0], which[1] - which[0] if len(which) > 1 else 1
-    if step == 0 or data.strides[1] != data.itemsize or which != list(range(first, first + step * len(which), step)):
-        return data[which]
-    stop = first + step * len(which)
-    return data[first : stop if stop >= 0 else None : step]

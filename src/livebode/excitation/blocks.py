@@ -33,8 +33,9 @@ def places(period: int) -> tuple[Floats, int]:
 
 def slopes(level: Floats) -> tuple[Floats, Floats]:
     """Slopes of the drift through these levels of periods, before the middle of each period and behind it."""
-    behind = np.diff(level, append=level[-1]) if level.size > 1 else np.zeros(1)
+    behind = np.zeros(level.size)
     if level.size > 1:
+        behind[:-1] = level[1:] - level[:-1]
         behind[-1] = behind[-2]
     return np.concatenate((behind[:1], behind[:-1])), behind
 

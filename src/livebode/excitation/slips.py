@@ -59,6 +59,8 @@ def find_slips(x: Floats, period: int) -> tuple[Slip, ...]:
     if count < _PERIODS_MIN:
         return ()
     blocks = x[: count * period].reshape(count, period)
+    if np.array_equal(blocks[0], blocks[1]) and np.array_equal(blocks[2:], blocks[1:-1]):
+        return ()  # a digital command: in equal periods no other shift agrees better by more than rounding
     return tuple(_Search(blocks - blocks.mean(axis=1, keepdims=True)).slips())
 
 
@@ -114,15 +116,16 @@ class _Search:
         nothing, as by half a window of two periods, is not a jump.
         """
         known = recent[-1]
-        energy = np.dot(known, known)
-        rows = self._blocks[index : index + _TOGETHER]
-        differ = _row_energies(rows, np.roll(known, -shift)) > _EQUAL * energy
-        if differ[0] or np.any(_row_energies(recent, known) > _EQUAL * energy):
+        energy, next_one = np.dot(known, known), np.roll(known, -shift)
+        near = np.concatenate([recent - known, self._blocks[index : index + 1] - next_one])
+        if np.any(_row_energies(near) > _EQUAL * energy):
             return 0
         own = np.fft.irfft(np.abs(np.fft.rfft(known)) ** 2, self._period)[1:]
         changes = 2 * (energy - own)
         if np.any((changes > _UNCHANGED / 2 * energy) & (changes < _CHANGED * energy)):
             return 0
+        rows = self._blocks[index : index + _TOGETHER]
+        differ = _row_energies(rows, next_one) > _EQUAL * energy
         return int(np.argmax(differ)) if differ.any() else len(rows)
 
     def _calm(self, index: int, recent: Floats, shift: int) -> Floats:
@@ -133,11 +136,22 @@ class _Search:
             expected += known[behind : behind + len(here)]
         expected /= _REMEMBERED
         spectra = self._spectra[index : index + _TOGETHER]
-        agreement = np.fft.irfft(np.fft.rfft(expected, axis=1) * spectra.conj(), self._period, axis=1)
-        usual = _STRANGE * self._noise + _ROUNDING * self._energy[index : index + _TOGETHER]
-        jumps = np.argmax(agreement, axis=1) != shift % self._period
-        unusual = jumps | (np.sum((here - expected) ** 2, axis=1) > usual)
+        template = np.fft.rfft(expected, axis=1)
+        agreement = np.fft.irfft(template * spectra.conj(), self._period, axis=1)
+        energy = self._energy[index : index + _TOGETHER]
+        unusual = np.sum((here - expected) ** 2, axis=1) > _STRANGE * self._noise + _ROUNDING * energy
+        leaps = (np.argmax(agreement, axis=1) - shift) % self._period
+        moved = np.flatnonzero(leaps)
+        if moved.size:
+            # Where another shift changes nothing, as by half a window of two periods, noise alone decides for it.
+            own = np.fft.irfft(np.abs(template[moved]) ** 2, self._period, axis=1)
+            changes = 2 * (own[:, 0] - own[np.arange(moved.size), leaps[moved]])
+            unusual[moved] |= changes > self._least(energy[moved]) / 2  # half: far above the rounding of `_leap`
         return here[: int(np.argmax(unusual))] if unusual.any() else here
+
+    def _least(self, energy: Floats) -> Floats:
+        """The change by a shift that is clear, in periods of this energy."""
+        return np.asarray(np.maximum(_CLEAR * self._noise / self._period, _UNCHANGED * energy))
 
     def _leap(self, index: int, expected: Floats, shift: int) -> int:
         """Phase jump in samples in this period or the previous one; 0 without a jump."""
@@ -154,8 +168,7 @@ class _Search:
             gain = 2 * (agreement[best] - agreement[shift % self._period])
             residual = self._energy[m] + own[0] - 2 * agreement[best]
             fits = residual <= self._noise * 2 + _AGREES * energy
-            least = max(_CLEAR * self._noise / self._period, _UNCHANGED * self._energy[m])
-            clear = gain > energy / 2 and energy > least
+            clear = gain > energy / 2 and energy > self._least(self._energy[m])
             if not here or not fits or not clear or (leap and here != leap):
                 return 0
             leap = here

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from bisect import bisect_left
 from typing import Any
 
 import numpy as np
@@ -113,19 +112,21 @@ class DriftTest(StatefulBase):
 
     def _add_windows(self, part: Responses, single: NDArray[np.intp]) -> None:
         """Add those of the responses `single`, each of one window, that do not overlap."""
-        first, last = part.first[single].tolist(), part.sample[single].tolist()
-        chosen: list[int] = []
-        index = bisect_left(first, self._free)
-        while index < len(first):
-            chosen.append(index)
-            self._free = int(last[index]) + 1
-            index = bisect_left(first, self._free, index)
-        if chosen:
-            windows = part[single[chosen]]
-            if np.isnan(self._begin[0]) and (valid := windows.valid.any(axis=1)).any():
-                self._begin_with(windows[int(np.argmax(valid))])
-            weight = np.where(np.isfinite(windows.weight), windows.weight, 1.0)
-            self._add(windows.time_s, windows.schedule, np.where(windows.valid, windows.value, np.nan), weight)
+        first, after = part.first[single], part.sample[single] + 1
+        index, following = int(np.searchsorted(first, self._free)), np.searchsorted(first, after).tolist()
+        places: list[int] = []
+        while index < len(following):
+            places.append(index)
+            index = following[index]
+        if places:
+            self._free = int(after[places[-1]])
+            chosen = single[places]
+            valid, weight = part.valid[chosen], part.weight[chosen]
+            if np.isnan(self._begin[0]) and (some := valid.any(axis=1)).any():
+                self._begin_with(part[int(chosen[np.argmax(some)])])
+            weight = np.where(np.isfinite(weight), weight, 1.0)
+            value = np.where(valid, part.value[chosen], np.nan)
+            self._add(part.time_s[chosen], part.schedule[chosen], value, weight)
 
     def _begin_with(self, window: Response) -> None:
         self._begin = np.array([window.first, window.sample, window.time_s])

@@ -249,7 +249,7 @@ class SteadySearch:
         if self._together < EXAMINED_MIN:
             return
         missing = np.full((len(self.channels), block.start - self._stop), np.nan)
-        self._rows = np.concatenate([self._rows, missing, block.data[[block.index(c) for c in self.channels]]], axis=1)
+        self._rows = np.concatenate([self._rows, missing, block.rows(self.channels)], axis=1)
         self._stop, half = block.stop, self._together // 2
         while self._rows.shape[1] >= (self._together + half) * self._window:
             self._judge(self._rows, last=False)

@@ -121,7 +121,7 @@ class SilencesOfRecording:
             return
         if block.gap or block.start != self._stop:
             self._found += self._search.interrupt()
-        signals = block.data[[block.index(name) for name in self._signals]]
+        signals = block.rows(self._signals)
         self._found += self._search.process(signals, block[self._excitation], block.start, np.zeros(0, dtype=np.intp))
         self._stop = block.stop
 

@@ -7,6 +7,7 @@ import time
 from livebode.configuration import NOT_RECORDED, Axis, open_recordings
 from livebode.core import RunClock, moments_by
 from livebode.estimates import rule
+from livebode.runtime.allocation import keep_freed_memory
 from livebode.runtime.documents import RunStep
 from livebode.runtime.estimate import ExaminedRecording, Outcome
 from livebode.runtime.feed import Feed
@@ -43,6 +44,7 @@ def run(axis: Axis, to: Destination, control: RunControl | None = None) -> Outco
         from livebode.runtime.live import run_live
 
         return run_live(axis, to, control)
+    keep_freed_memory()
     of: ExaminedRecording = rule(kind, "recording")(named, logs, to)
     about = {"configuration": of.axis.model_dump(mode="json", exclude=NOT_RECORDED, by_alias=True), "found": of.found}
     about |= provenance(of.axis, of.digests)
