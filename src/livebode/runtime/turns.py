@@ -190,10 +190,12 @@ class _Line:
         return one
 
     def _next(self, leader: Turn) -> Turn | None:
-        """The axis that has waited longest, as soon as there is one; None if this thread does not lead any more."""
+        """The axis that has waited longest, as soon as there is one; None if this thread does not lead any more, or its
+        axis has ended, whose last step a thread that led before may have done.
+        """
         while True:
             with self._changed:
-                if self._leader is not leader:
+                if self._leader is not leader or leader.ended:
                     return None
                 now_s = time.monotonic()
                 if now_s - self._ticked_s >= TICK_S:
