@@ -68,17 +68,14 @@ def test_the_core_does_its_work_alone(answers: dict[str, Answer], command: str) 
     assert "error" not in answers[command].err
 
 
-@pytest.mark.parametrize("command", ["run", "margins", "design", "demo"])
-def test_a_command_with_pictures_says_once_how_to_get_them(answers: dict[str, Answer], command: str) -> None:
-    assert answers[command].out.count("no pictures, because Matplotlib is not installed; run ") == 1
-    lines = [line for line in answers[command].out.splitlines() if not line.startswith("Next: ")]
-    assert "plots" in lines[-1]
+def test_a_report_without_its_fonts_says_how_to_get_a_pdf(answers: dict[str, Answer]) -> None:
+    assert answers["report"].code == 0
+    assert "no PDF: a PDF needs the fonts of Matplotlib; run " in answers["report"].out
 
 
 @pytest.mark.parametrize(
     ("command", "extra", "sentence"),
     [
-        ("report", "plots", "a picture needs Matplotlib, which is not installed; run "),
         ("validate", "analysis", "a validation needs SciPy, which is not installed; run "),
         ("modal", "analysis", "a fit of poles needs SciPy, which is not installed; run "),
         ("mat", "analysis", "an export for MATLAB needs SciPy, which is not installed; run "),
@@ -95,7 +92,5 @@ def test_a_command_with_pictures_says_once_how_to_get_them(answers: dict[str, An
 def test_what_needs_an_extra_names_it(answers: dict[str, Answer], command: str, extra: str, sentence: str) -> None:
     assert answers[command].code == 2
     assert sentence in answers[command].err
-    assert {"plots": "matplotlib", "analysis": "scipy"}.get(extra, "pyarrow") in answers[
-        command
-    ].err or extra in answers[command].err
+    assert {"analysis": "scipy"}.get(extra, "pyarrow") in answers[command].err or extra in answers[command].err
     assert "Traceback" not in answers[command].err

@@ -17,7 +17,7 @@ from livebode.kernel import (
     LineMoments,
     LineSettings,
     LineWindows,
-    Machine,
+    MachineLines,
     NewestWindows,
     instruction_sets,
     process_lines,
@@ -175,8 +175,8 @@ def test_any_division_of_the_windows_gives_the_same_bits(case):
     assert_same_bits(whole, parts)
 
 
-def machine(case: Case) -> Machine:
-    return Machine(case.moments(), np.zeros(3), np.full(3, np.inf), False)
+def machine(case: Case) -> MachineLines:
+    return MachineLines(case.moments(), np.zeros(3), np.full(3, np.inf), False)
 
 
 def chosen(case: Case) -> tuple[np.ndarray, np.ndarray]:

@@ -129,7 +129,7 @@ def test_each_of_two_recordings_has_the_run_that_it_has_alone(tmp_path: Path) ->
     result = livebode("run", tmp_path / "axes.toml", "--out", tmp_path / "runs")
     assert result.code == 2
     assert "livebode: c: there is no file" in result.err
-    assert "a: 400 responses at 3 lines" in result.out
+    assert "a: 80 responses at 3 lines" in result.out
     assert "b: 40 responses at 3 lines" in result.out
     for name, hop in (("a", 5), ("b", 50)):
         alone = livebode(

@@ -12,7 +12,6 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from livebode.core import Event
@@ -21,7 +20,7 @@ from livebode.records import RunRecord
 from livebode.runtime import Document, RunStarted
 from livebode.sources.live import encode_layout, encode_line, encode_samples
 from tests.support.command import RATE_HZ, livebode, signals, write_parquet
-from tests.support.live_runs import CHANNELS, axis, sent, started, table
+from tests.support.live_runs import CHANNELS, assert_recorded, axis, sent, started, table
 from tests.support.live_session import LiveSession
 from tests.support.peers.peer import PATIENCE_S, batches, free_port, until
 from tests.support.peers.plain import TcpPeer, wait_read
@@ -34,9 +33,7 @@ def test_lines_on_standard_input_give_what_the_recording_gives(tmp_path):
     assert (process.returncode, err) == (0, b"")
     log = write_parquet(tmp_path / "log.parquet", signals())
     livebode("run", axis(tmp_path, f'log = "{log}"'), "--out", tmp_path / "recorded")
-    live, recorded = table(tmp_path / "live"), table(tmp_path / "recorded")
-    for name in recorded:
-        np.testing.assert_array_equal(live[name], recorded[name], err_msg=name)
+    assert_recorded(table(tmp_path / "live"), table(tmp_path / "recorded"))
     summary = json.loads(out)
     assert summary["counts"]["samples"] == 2000
     assert summary["source"]["first_sample"] == 70_000

@@ -28,7 +28,7 @@ from livebode.sources.live.kernel_drive import KernelDrive
 from tests.support.command import livebode, write_parquet
 from tests.support.errors import refused
 from tests.support.forked import Command
-from tests.support.live_runs import started, table
+from tests.support.live_runs import assert_recorded, started, table
 from tests.support.monitored import small_baseline
 from tests.support.peers.broker import MqttPeer
 from tests.support.peers.peer import PATIENCE_S, Peer, fed
@@ -176,11 +176,8 @@ def test_a_run_on_spectra_is_the_run_on_the_samples(tmp_path: Path, kind: type[P
     pause_s = HOP / record().rate_hz if kind is TcpPeer else 0.002
     summary, out = run_live(tmp_path, "live", frames(record(), layout()), config, kind, pause_s)
     theirs, ours = table(recorded(tmp_path, config, record())), table(out)
-    for name in theirs:
-        if name == "schedule":
-            np.testing.assert_allclose(ours[name], theirs[name], rtol=2.0**-24)
-        else:
-            np.testing.assert_array_equal(ours[name], theirs[name], err_msg=name)
+    np.testing.assert_allclose(ours["schedule"], theirs["schedule"], rtol=2.0**-24)
+    assert_recorded(ours, theirs, but=["schedule"])
     assert summary["counts"]["samples"] == len(record())
     assert summary["found"]["from"] == "spectra"
     assert summary["found"]["quiet_bins"] == list(LINES.quiet)

@@ -14,6 +14,7 @@ from livebode.simulation import BeltAxis, Friction, Sensor, SimulatedAxis, Strok
 from tests.support.axes import MULTISINE
 from tests.support.command import livebode, write_parquet
 from tests.support.moving import SETTINGS
+from tests.support.responses import as_recorded
 
 NAMES = ("w", "u", "velocity", "x")
 AXIS = """
@@ -50,7 +51,7 @@ def test_the_run_is_that_of_the_correction(folder: Path) -> None:
     assert (result.code, result.err) == (0, "")
     correction = MotionCorrection(SETTINGS, radius_m=0.019, chunk_samples=15600)
     block = Block(np.load(folder / "data.npy"), NAMES, 4000.0)
-    expected = Responses.join([correction.process(block), correction.finish()])
+    expected = as_recorded(Responses.join([correction.process(block), correction.finish()]))
     table = pq.read_table(folder / "run" / "responses.parquet").to_pydict()
     for name, values in {"re": expected.value.real, "sigma": expected.sigma, "valid": expected.valid}.items():
         assert np.array_equal(np.reshape(table[name], values.shape), values, equal_nan=name != "valid"), name

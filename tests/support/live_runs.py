@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -38,4 +39,16 @@ def started(path: Path, out: Path) -> Command:
 
 def table(out: Path, what: str = "responses") -> dict[str, np.ndarray]:
     table = pa.concat_tables(map(pa.table, RunRecord.open(out).tables(what)))
-    return {name: np.array(column) for name, column in table.to_pydict().items()}
+    return {
+        name: np.array(column.to_pylist(), _dtype(column)) for name, column in zip(table.column_names, table.columns)
+    }
+
+
+def _dtype(column: pa.ChunkedArray) -> type | None:
+    return np.float32 if column.type == pa.float32() else None
+
+
+def assert_recorded(live: dict[str, np.ndarray], recorded: dict[str, np.ndarray], *, but: Sequence[str] = ()) -> None:
+    """The run of a recording has the values of the live run, what describes their accuracy in single precision."""
+    for name in recorded.keys() - {*but}:
+        np.testing.assert_array_equal(live[name].astype(recorded[name].dtype), recorded[name], err_msg=name)

@@ -21,7 +21,7 @@ from livebode.kernel import (
     LineRows,
     LineSettings,
     LineWindows,
-    Machine,
+    MachineLines,
     NewestWindows,
     WeightSums,
 )
@@ -51,7 +51,7 @@ def process_lines(settings: LineSettings, moments: LineMoments, windows: LineWin
 
 
 def process_newest(
-    settings: LineSettings, machines: list[Machine], windows: NewestWindows, factor: float
+    settings: LineSettings, machines: list[MachineLines], windows: NewestWindows, factor: float
 ) -> tuple[LineRows, Floats, Flags]:
     """One window of each of several machines with the same settings; rows of those that take it."""
     yes, found, largest, taken = np.ones(1, dtype=np.bool_), [], windows.largest.copy(), windows.due.copy()

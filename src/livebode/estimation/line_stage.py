@@ -27,7 +27,7 @@ from livebode.kernel import (
     LineRows,
     LineSettings,
     LineWindows,
-    Machine,
+    MachineLines,
     NewestWindows,
     chosen_instruction_set,
     process_lines,
@@ -271,7 +271,7 @@ class LineStage(StatefulBase):
         moment = np.empty((len(stages), 3))
         moment[:, :2], moment[:, 2] = centre.T, sample - (s.lines.window - 1)
         largest, places = np.array([stage._largest for stage in stages]), (place // s.step - 1) % example._places
-        machines = [Machine(stage._moments.arrays, *own.newest) for stage, own in zip(stages, ranges)]
+        machines = [MachineLines(stage._moments.arrays, *own.newest) for stage, own in zip(stages, ranges)]
         windows = NewestWindows(largest, places, sums, chosen, moment, due)
         results, largest, taken = process_newest(example._kernel_settings, machines, windows, FACTOR)
         for stage, own, power_max, is_taken in zip(stages, ranges, largest.tolist(), taken.tolist()):

@@ -40,7 +40,7 @@ from livebode.kernel._lines import LineMoments as LineMoments
 from livebode.kernel._lines import LineRows as LineRows
 from livebode.kernel._lines import LineSettings as LineSettings
 from livebode.kernel._lines import LineWindows as LineWindows
-from livebode.kernel._lines import Machine as Machine
+from livebode.kernel._lines import MachineLines as MachineLines
 from livebode.kernel._lines import NewestWindows as NewestWindows
 from livebode.kernel._lines import WeightSums as WeightSums
 from livebode.kernel._lines import largest_magnitudes as largest_magnitudes

@@ -158,7 +158,7 @@ class LineWindows(NamedTuple):
     moment: Floats
 
 
-class Machine(NamedTuple):
+class MachineLines(NamedTuple):
     """What is known of one of several machines before its next window; the arrays are changed.
 
     Attributes
@@ -229,7 +229,7 @@ def process_lines(settings: LineSettings, moments: LineMoments, windows: LineWin
 
 
 def process_newest(
-    settings: LineSettings, machines: list[Machine], windows: NewestWindows, factor: float
+    settings: LineSettings, machines: list[MachineLines], windows: NewestWindows, factor: float
 ) -> tuple[LineRows, Floats, Flags]:
     """One window of each of several machines with the same settings, where noise is NOISE_SCATTER.
 

@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterator, Sequence
 
 from livebode.sources.recording import Chunk, Column
 
-VALUES_MAX = 1 << 21
-"""Values that are held at most: 16 MB in double precision."""
+VALUES_MAX = 1 << 19
+"""Values that are held at most: 4 MB in double precision."""
 
 
 class HeldChunks:
