@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from pydantic import BaseModel
 
 from livebode.configuration import MAY_BE_SECRET, Axis
-from livebode.core import OutputError
+from livebode.core import OutputError, TypedTable
 from livebode.doctor import Check, Subject, bundle, write_bundle
 from livebode.doctor.bundle import REMOVED, Secrets
 from livebode_design import Experiment
@@ -25,14 +25,14 @@ from tests.support.small_axis import ONE_LINE
 SECRET = "hunter2-and-more"
 
 
-def models(annotation: Any) -> Iterator[type[BaseModel]]:
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+def models(annotation: Any) -> Iterator[type[Any]]:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel | TypedTable):
         yield annotation
     for inner in get_args(annotation):
         yield from models(inner)
 
 
-def leaves(model: type[BaseModel], place: tuple[str, ...] = ()) -> Iterator[tuple[str, ...]]:
+def leaves(model: type[Any], place: tuple[str, ...] = ()) -> Iterator[tuple[str, ...]]:
     """Every key of a configuration, by its place."""
     for name, field in model.model_fields.items():
         inner = next(models(field.annotation), None)

@@ -139,7 +139,7 @@ class Secrets:
 
 def _models(annotation: Any) -> Iterator[type[TypedTable]]:
     """The models in a field's annotation."""
-    if isinstance(annotation, type) and issubclass(annotation, TypedTable):
+    if isinstance(annotation, type) and hasattr(annotation, "model_fields"):  # of a plug-in perhaps pydantic's own
         yield annotation
     for inner in get_args(annotation):
         yield from _models(inner)
