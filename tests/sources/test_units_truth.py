@@ -241,7 +241,11 @@ def test_samples_that_were_recorded_in_si_units_are_replayed_as_they_are(tmp_pat
     first = run(Axis.of(given, "test"), Destination(tmp_path / "run", lambda *_: None))
     found = RunRecord.open(first.directory)
     lines = {"frequencies": ",".join(f"{f:g}" for f in found.lines.frequency_hz), "window": found.lines.window}
-    again = given | {"source": {"replay": tmp_path / "run", "units": dict(export.units)}, "lines": lines}
+    again = given | {
+        "source": {"replay": tmp_path / "run", "units": dict(export.units)},
+        "lines": lines,
+        "tracking": {"hop": found.summary["found"]["hop"]},
+    }
     second = RunRecord.open(run(Axis.of(again, "test"), Destination(tmp_path / "again", lambda *_: None)).directory)
     assert second.kinds == found.kinds
     assert np.nanmean(np.abs(second.responses().value)) == pytest.approx(

@@ -91,9 +91,9 @@ def run_command(
 ) -> NextCommand:
     """Track the frequency response of a machine in a recording, or live until the source ends or Ctrl-C.
 
-    Writes a run directory with responses.parquet, run.json, events.jsonl, bode.png and tracking.png; with several
+    Writes a run directory with responses.parquet, run.json, events.jsonl, bode.svg and tracking.svg; with several
     --output one for each in --out, which livebode fit takes together. With several --input, or with --matrix, the run
-    has a matrix of responses from all inputs to all outputs, and singular-values.png instead of tracking.png.
+    has a matrix of responses from all inputs to all outputs, and singular-values.svg instead of tracking.svg.
     """
     as_matrix = matrix or any(len(names or []) > 1 for names in (input, excitation))
     named = {

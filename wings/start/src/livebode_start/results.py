@@ -17,7 +17,7 @@ FILE_BYTES_MAX = 256 << 20
 _LISTED_MAX = 500
 _FACTS = "design.json"
 _FACTS_BYTES_MAX = 4 << 20
-_SHOWN = {".html": "text/html; charset=utf-8", ".png": "image/png"}
+_SHOWN = {".html": "text/html; charset=utf-8", ".svg": "image/svg+xml"}
 _ENDINGS = {"baselines": (".json",), "comparisons": (".html", ".pdf")}
 _REPORTS = ("report.html", "report.pdf")
 

@@ -52,7 +52,7 @@ function resultShown(result, whole) {
     .filter(([file]) => !file.endsWith(".schema.json"))
     .sort(([a], [b]) => rank(a) - rank(b))
     .map(([file, bytes]) => {
-      const shown = file.endsWith(".html") || file.endsWith(".png");
+      const shown = file.endsWith(".html") || file.endsWith(".svg");
       const link = element(
         "a",
         {
@@ -79,7 +79,7 @@ function resultShown(result, whole) {
       ),
     );
   if (!whole) return parts;
-  const picture = result.files.find(([file]) => file.endsWith(".png"));
+  const picture = result.files.find(([file]) => file.endsWith(".svg"));
   if (picture)
     parts.append(
       element("img", {
