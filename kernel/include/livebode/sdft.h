@@ -38,7 +38,7 @@ typedef enum {
     LB_ERROR_SNAPSHOT_CONFIG, /* a snapshot of another configuration */
     LB_ERROR_SNAPSHOT_CRC,    /* a damaged snapshot */
     LB_ERROR_TABLE,           /* unknown table, or a compact one with window > LB_COMPACT_WINDOW_MAX */
-    LB_ERROR_HOP              /* hop does not divide window, or is of another variant or table; or rows at another hop */
+    LB_ERROR_HOP /* hop does not divide window, or is of another variant or table; or rows at another hop */
 } lb_status;
 
 /* All except the first are for comparison. Windows are exact taps over neighbouring bins (Jacobsen & Lyons
@@ -76,8 +76,8 @@ typedef struct {
     double damping; /* pole radius of LB_DAMPED; ignored by the others */
     lb_instruction_set instruction_set;
     lb_table table;
-    uint32_t hop; /* 0: spectra after any sample. Else, a divisor of window: spectra after every hop-th sample only, for a
-                     third of the operations or less, LB_MODULATED with LB_TABLE_ROWS only; other bits than without */
+    uint32_t hop; /* 0: spectra after any sample. Else, a divisor of window: spectra after every hop-th sample only, for
+                     a third of the operations or less, LB_MODULATED with LB_TABLE_ROWS only; other bits than without */
 } lb_config;
 
 /* The instruction set that LB_BEST selects on this machine. */
