@@ -296,10 +296,9 @@ class _Inside:
         single = np.flatnonzero(alone(known))
         bars = "".join(f"M{x[i]:.0f} {low[i]:.0f}V{high[i]:.0f}" for i in single)
         area = "".join(areas)
-        filled = f'<path class="{mark.name}" d="{area}" fill="{mark.colour}" fill-opacity="{mark.alpha:g}"/>' * bool(
-            area
+        return _filled(mark, area) + _stroked(
+            mark.name, bars, mark.colour, 60, f' stroke-opacity="{1.5 * mark.alpha:g}"'
         )
-        return filled + _stroked(mark.name, bars, mark.colour, 60, f' stroke-opacity="{1.5 * mark.alpha:g}"')
 
     def _bars(self, mark: described.Bars) -> str:
         x, low, high = _distinct(np.column_stack([self._x(mark.x), self._y(mark.low), self._y(mark.high)])).T
@@ -325,12 +324,12 @@ class _Inside:
     def _areas(self, mark: described.Areas) -> str:
         shapes = ((self._x(x), self._y(y)) for x, y in mark.corners)
         path = "".join(f"{_path(x, y)}z" for x, y in shapes if np.isfinite(x + y).all())
-        return f'<path class="{mark.name}" d="{path}" fill="{mark.colour}" fill-opacity="{mark.alpha:g}"/>' * bool(path)
+        return _filled(mark, path)
 
     def _shade(self, mark: described.Shade) -> str:
         ends = zip(self._x(mark.low), self._x(mark.high))
         path = "".join(f"M{low:.0f} 0H{high:.0f}V{self._height:.0f}H{low:.0f}z" for low, high in ends)
-        return f'<path class="{mark.name}" d="{path}" fill="{mark.colour}" fill-opacity="{mark.alpha:g}"/>' * bool(path)
+        return _filled(mark, path)
 
     def _cells(self, mark: described.Cells) -> str:
         y, count = self._of.y, max(int(2 * self._of.height), 2)
@@ -360,6 +359,11 @@ def _sign(kind: str, size: float) -> str:
 def _stroked(name: str, path: str, colour: str, width: float, more: str = "") -> str:
     named = f' class="{name}"' if name else ""
     return f'<path{named} d="{path}" fill="none" stroke="{colour}" stroke-width="{_n(width)}"{more}/>' if path else ""
+
+
+def _filled(mark: described.Band | described.Areas | described.Shade, path: str) -> str:
+    shape = f'<path class="{mark.name}" d="{path}" fill="{mark.colour}" fill-opacity="{mark.alpha:g}"/>'
+    return shape if path else ""
 
 
 def _runs(values: Floats) -> Iterable[slice]:

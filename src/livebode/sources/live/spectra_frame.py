@@ -7,6 +7,7 @@ The text is UTF-8, one item per line, its parts separated by tabs: ``window``, `
 from __future__ import annotations
 
 import zlib
+from functools import lru_cache
 from math import isfinite
 from typing import Any
 
@@ -136,9 +137,13 @@ def encode_spectra(batch: SpectraBatch, *, sequence: int = 0, double: bool = Fal
 
 def payload_type(layout: SpectraLayout, *, double: bool) -> np.dtype[Any]:
     """One spectrum in the payload."""
+    return _type_of(len(layout.values), len(layout.signals), len(layout.bins), double)
+
+
+@lru_cache
+def _type_of(values: int, signals: int, bins: int, double: bool) -> np.dtype[Any]:
     real = "<f8" if double else "<f4"
-    sums = (len(layout.signals), len(layout.bins), 2)
-    return np.dtype([("state", "<u4"), ("values", real, (len(layout.values),)), ("sums", real, sums)])
+    return np.dtype([("state", "<u4"), ("values", real, (values,)), ("sums", real, (signals, bins, 2))])
 
 
 def read_spectra(header: Header, payload: bytes | memoryview, layout: SpectraLayout, arrived_s: float) -> SpectraBatch:
@@ -149,7 +154,7 @@ def read_spectra(header: Header, payload: bytes | memoryview, layout: SpectraLay
             f"a frame of spectra has {header.channels} channels, its layout {count}", channels=[header.channels, count]
         )
     double = bool(header.flags & FLOAT64)
-    itemsize = _size_bytes(layout, double=double)
+    itemsize = payload_type(layout, double=double).itemsize
     if not header.samples or len(payload) != header.samples * itemsize:
         raise inconsistent_frame(
             f"a frame of {header.samples} spectra of {itemsize} bytes each has {len(payload)} bytes of them",
@@ -191,11 +196,6 @@ def read_row(
     sums = np.frombuffer(payload, pair, offset=4 + values.nbytes).reshape(len(layout.signals), 1, -1)
     with np.errstate(invalid="ignore"):  # as above
         return sums.astype(np.complex128), values.astype(np.float64)[:, np.newaxis], states
-
-
-def _size_bytes(layout: SpectraLayout, *, double: bool) -> int:
-    """Bytes of one spectrum in a payload."""
-    return 4 + (8 if double else 4) * (len(layout.values) + 2 * len(layout.signals) * len(layout.bins))
 
 
 def stamp_of(stamp_ns: int, hop: int, rate_hz: float) -> float | None:
