@@ -20,6 +20,7 @@ from livebode.locations import location
         "from": ("--from", "MOMENT"),
         "to": ("--to", "MOMENT"),
         "skip_periods": ("--skip-periods", "N"),
+        "unwrap": ("--unwrap", ""),
         "dbc": ("--dbc", "FILE"),
     },
     signals={"schedule": ("--schedule", "CHANNEL")},

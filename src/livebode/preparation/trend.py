@@ -235,12 +235,23 @@ def _whole(x: Floats, window: int) -> Floats:
     return filled(x)
 
 
-def trend_event(found: Sequence[ChannelTrend], settings: Settings, channels: Sequence[Channel], first: int) -> Event:
-    """One Event for the channels whose trend is subtracted."""
+def trend_event(
+    found: Sequence[ChannelTrend],
+    settings: Settings,
+    channels: Sequence[Channel],
+    first: int,
+    *,
+    straight: bool = False,
+) -> Event:
+    """One Event for the channels whose trend is subtracted; `straight`: a line that is fitted to each window."""
+    drifts = trend_text(found, channels)
     message = Message(
-        "{drifts}: this trend, the moving mean over a window, is subtracted; --trend keep leaves it in",
-        drifts=_sentences(found, channels),
+        "{drifts}: this trend, the moving mean over a window, is subtracted; --trend keep leaves it in", drifts=drifts
     )
+    if straight:
+        message = Message(
+            "{drifts}: this trend is fitted as a straight line in each window; --trend keep leaves it in", drifts=drifts
+        )
     return Event("trend-subtracted", first, first / settings.lines.rate_hz, message, {"channels": trend_facts(found)})
 
 
@@ -262,11 +273,12 @@ def live_trend_message(found: Sequence[ChannelTrend], channels: Sequence[Channel
     return Message(
         "{drifts}, and the bounds do not contain it; in a live run it is taken out by naming the channel in "
         "tracking.differenced",
-        drifts=_sentences(found, channels),
+        drifts=trend_text(found, channels),
     )
 
 
-def _sentences(found: Sequence[ChannelTrend], channels: Sequence[Channel]) -> str:
+def trend_text(found: Sequence[ChannelTrend], channels: Sequence[Channel]) -> str:
+    """What drifts, by how much, and what that adds to which line."""
     units = {channel.name: channel.unit for channel in channels}
     return Message.conjunction(_sentence(one, f" {unit}" if (unit := units.get(one.channel)) else "") for one in found)
 

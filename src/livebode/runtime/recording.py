@@ -32,6 +32,7 @@ from livebode.preparation import (
     trend_event,
     trend_of,
     window_in_doubt,
+    wrap_events,
 )
 from livebode.records import content_sha256
 from livebode.runtime.documents import RunStep
@@ -82,6 +83,7 @@ def examined(axis: Axis, log: Log, follower: Follower, shift: int = 0) -> Examin
     settings = follower.settings
     noticed = [Event("roles-doubtful", 0, 0.0, message) for message in roles_in_doubt(axis, log, settings)]
     noticed += window_in_doubt(axis, log, settings) + hop_event(axis, log, settings)
+    noticed += wrap_events(log)
     slips = slips_of(log, settings)
     if slips:
         noticed.append(slip_event(slips, settings))
@@ -96,6 +98,8 @@ def examined(axis: Axis, log: Log, follower: Follower, shift: int = 0) -> Examin
         source, left_out, noticed = replace(source, first=kept.first), kept.left_out, noticed + kept.noticed
     found = {"format": log.format, "rate_from": log.rate_origin, "phase_slips": len(slips)}
     found |= {"left_out_samples": source.first - log.first, "clock": log.clock_kind}
+    if log.wraps:
+        found["unwrapped"] = {name: wrap.turn for name, wrap in log.wraps.items()}
     if log.is_part:
         found["part"] = {"first": log.first, "stop": log.stop}
     if of_tracker is not None and isinstance(follower, Tracker):
