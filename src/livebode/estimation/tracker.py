@@ -18,7 +18,7 @@ from livebode.estimation.silence_search import HumSpan
 from livebode.estimation.spectra import LineSpectra
 from livebode.estimation.stream_estimator import Centre, InputStatistics, StreamEstimator, signals_of
 from livebode.estimation.tracker_settings import Settings
-from livebode.estimation.trend import Trend
+from livebode.estimation.trend import SignalTrend
 
 NOTHING: Integers = np.zeros((0, 2), dtype=np.int64)
 """No stretch is set aside."""
@@ -102,7 +102,7 @@ class Tracker(StreamEstimator[InputStatistics]):
         self._repeating = RepeatingErrors(settings, self._events) if repeating else None
         self._watch = InputStatistics(self._events, window)
         self._end, self._aside = (0, 0.0), NOTHING
-        self._trend: Trend | None = None
+        self._trend: SignalTrend | None = None
         self._parts = {
             "spectra": self._spectra,
             "lines": self._lines,
@@ -133,7 +133,7 @@ class Tracker(StreamEstimator[InputStatistics]):
         if self._repeating is not None:
             self._repeating.know_hum(spans)
 
-    def know_trend(self, trend: Trend) -> None:
+    def know_trend(self, trend: SignalTrend) -> None:
         """The trend of a whole recording, which is subtracted from the signals; the schedule is not changed."""
         self._trend = trend
 

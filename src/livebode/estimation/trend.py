@@ -1,4 +1,4 @@
-"""Trend: what a Tracker subtracts from signals that drift, before their DFT."""
+"""The trend that a Tracker subtracts from signals that drift, before their DFT."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class TrendStretch:
 
 
 @dataclass(frozen=True, eq=False)
-class Trend:
+class SignalTrend:
     """Trend of some channels over a recording.
 
     Attributes
@@ -64,7 +64,7 @@ class Trend:
         rows = [self.channels.index(name) if name in self.channels else -1 for name in names]
         return np.asarray(known[rows])
 
-    def shifted(self, samples: int) -> Trend:
+    def shifted(self, samples: int) -> SignalTrend:
         """The trend of a recording whose samples have numbers that are larger by so many."""
         moved = [replace(one, first=one.first + samples, stop=one.stop + samples) for one in self.stretches]
-        return Trend(self.channels, moved)
+        return SignalTrend(self.channels, moved)

@@ -10,7 +10,7 @@ import numpy as np
 from livebode.arrays import Complex, Flags, Floats
 from livebode.core import Block, Channel, Event
 from livebode.dataclass import dataclass
-from livebode.estimation import Settings, Trend, TrendStretch
+from livebode.estimation import Settings, SignalTrend, TrendStretch
 from livebode.excitation import filled, slow_part, spectra
 from livebode.language import Message
 from livebode.preparation._steady import excited_bins, moves
@@ -175,7 +175,7 @@ def drifting_channels(log: RecordedSource, settings: Settings) -> list[ChannelTr
     return search.finish()
 
 
-def trend_of(source: AlignedLog, names: Sequence[str], window: int) -> Trend:
+def trend_of(source: AlignedLog, names: Sequence[str], window: int) -> SignalTrend:
     """The trend of these channels over a recording, from its first sample on."""
     stretches: list[TrendStretch] = []
     now: _Stretch | None = None
@@ -185,7 +185,7 @@ def trend_of(source: AlignedLog, names: Sequence[str], window: int) -> Trend:
             now = _Stretch(len(names), window, block.start)
         now.add(block.rows(names))
     stretches += [] if now is None else now.finish()
-    return Trend(tuple(names), stretches)
+    return SignalTrend(tuple(names), stretches)
 
 
 class _Stretch:
