@@ -378,6 +378,8 @@ NOT_HERE = {
     "describe the axis by [belt] in place of [measured]": "in wings/design/tests/test_simulated_measurement_truth.py",
     "livebode inspect ": "an address at which nothing usable comes",
     "install the wing": "an installation without a wing",
+    "--trend keep leaves it in": "a signal that drifts: tests/cli/test_slow_signals_truth.py",
+    "--no-unwrap leaves it as it is": "an angle that wraps: tests/cli/test_slow_signals_truth.py",
     "--hop {usual} gives the usual number": "a long recording: tests/preparation/test_long_recordings_truth.py",
     "choose a multiple of them as window": "in tests/preparation/test_roles_truth.py",
     "run a part of the recording (--from, --to)": "a drift: tests/runtime/test_average_truth.py",

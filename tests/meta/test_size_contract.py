@@ -10,7 +10,7 @@ from tools.changed_tests import ROOT, changed_modules, concerned
 from tools.size import commands_and_options, import_depth, imports, limits, past_faces, sizes
 
 PAST_FACES_MAX = 0.05
-DEPTH_MAX, COMMANDS_MAX, OPTIONS_MAX, README_LINES_MAX = 25, 30, 291, 150
+DEPTH_MAX, COMMANDS_MAX, OPTIONS_MAX, README_LINES_MAX = 25, 30, 292, 150
 
 
 def test_each_package_is_within_its_limits() -> None:

@@ -87,7 +87,7 @@ def test_a_difference_begins_again_behind_a_gap_and_is_whole_in_a_part(tmp_path:
         ("-enc9", "there is no channel 'enc9'; did you mean"),
         ("a + nothing", "there is no channel 'nothing'"),
         ("a +", "it is not of the form a - 0.5*b"),
-        ("a**2", "only names, numbers, + - * / and diff(…) are possible"),
+        ("a**2", "only names, numbers, + - * /, diff(…) and unwrap(…, turn) are possible"),
         ("abs(a)", "only names"),
         ("a[0]*2", "only names"),
         ("a + True", "only names"),

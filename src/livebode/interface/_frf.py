@@ -47,6 +47,8 @@ _ARGUMENTS = {
     "signals.output": "y",
     "rate_hz": "fs",
     " (--estimator lpm)": "",
+    "; --trend keep leaves it in": "",
+    "; --no-unwrap leaves it as it is": "",
     ", or check the recording with `livebode inspect`": "",
     'ignore the column (time = "none")': "give the values alone, as u.to_numpy()",
     "time column": "index",
@@ -305,6 +307,7 @@ class _Recorded:
             )
         with _by_argument(name):
             log = _log(_recording(name, series_of(**signals)), settings.fs)
+            log = log.unwrapping(log.search_wraps(["y"]))
             estimator = suitable_estimator(log, roles)[0] if estimator == "auto" else estimator
             sections["tracking"]["estimator"] = estimator
             axis = Axis.of({"source": {"log": name}, "signals": roles} | sections, name)

@@ -10,13 +10,15 @@ import tomli_w
 from livebode.configuration import Axis, check_fit
 from livebode.core import Lines, LivebodeError
 from livebode.dataclass import dataclass
-from livebode.estimation import DETECTION_LINES_MIN
+from livebode.estimation import DETECTION_LINES_MIN, Settings
 from livebode.excitation import recognise
 from livebode.language import Message
 from livebode.preparation.followers import make_settings
 from livebode.preparation.nonperiodic import suits_lpm
 from livebode.preparation.plan import beginning, roles_in_doubt
-from livebode.sources import Log
+from livebode.preparation.trend import drifting_channels, trend_text
+from livebode.preparation.wraps import wrap_text
+from livebode.sources import Log, unwrapping_text
 
 if TYPE_CHECKING:
     from livebode.preparation.proposal import Proposals
@@ -123,12 +125,13 @@ def settled(log: Log, tables: Tables, reasons: Mapping[str, str]) -> Settled:
     LivebodeError
         If the recording contradicts the roles, or they do not suffice.
     """
+    tables, wrapped = _unwrapped(log, tables)
     axis = Axis.of(tables, "the answers")
     if axis.fit is not None:
         check_fit(axis.fit)
     settings = make_settings(axis, log)
     doubts = roles_in_doubt(axis, log, settings)
-    comments = {("signals", role): reason for role, reason in reasons.items()}
+    comments = {("signals", role): reason for role, reason in reasons.items()} | wrapped
     if not settings.periodic:
         return Settled(tables, comments, doubts)
     lines, periods = settings.lines, Message("one period")
@@ -144,6 +147,33 @@ def settled(log: Log, tables: Tables, reasons: Mapping[str, str]) -> Settled:
     comments["lines", "window"] = Message(
         "samples: {s:.6g} s, {periods}", s=lines.window / log.rate_hz, periods=periods
     )
+    tables, about = _with_trend(log, tables, settings)
+    comments |= about
     order = ("source", "signals", "lines")
     head = {name: tables[name] if name != "lines" else found for name in order}
     return Settled(head | {name: table for name, table in tables.items() if name not in order}, comments, doubts)
+
+
+def _with_trend(log: Log, tables: Tables, settings: Settings) -> tuple[Tables, dict[tuple[str, str], str]]:
+    """The tables with what is done to signals that drift, and its comment: a live source cannot look ahead."""
+    drifting = drifting_channels(log, settings)
+    if not drifting:
+        return tables, {}
+    names = [one.channel for one in drifting]
+    key, value = ("trend", "subtract") if "log" in tables["source"] else ("differenced", names)
+    comment = trend_text(drifting, log.naming(names).channels)
+    return tables | {"tracking": tables["tracking"] | {key: value}}, {("tracking", key): comment}
+
+
+def _unwrapped(log: Log, tables: Tables) -> tuple[Tables, dict[tuple[str, str], str]]:
+    """The tables with expressions that unwrap the output and the schedule of a recording, and their comments."""
+    signals = tables["signals"]
+    roles = [role for role in ("output", "schedule") if role in signals] if "log" in tables["source"] else []
+    wraps = log.search_wraps([signals[role] for role in roles])
+    channels = {channel.name: channel for channel in log.channels}
+    found = {role: signals[role] for role in roles if signals[role] in wraps}
+    texts = {role: unwrapping_text(name, wraps[name].turn) for role, name in found.items()}
+    comments: dict[tuple[str, str], str] = {
+        ("signals", role): wrap_text(channels[name], wraps[name]) for role, name in found.items()
+    }
+    return tables | {"signals": signals | texts}, comments

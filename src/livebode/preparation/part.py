@@ -7,6 +7,7 @@ from collections.abc import Callable
 from livebode.configuration import Axis
 from livebode.core import UsageError
 from livebode.preparation.plan import beginning, make_lines, reference_of
+from livebode.preparation.wraps import unwrapped
 from livebode.sources import Log, PartLimit, part_limit
 
 FindPeriods = Callable[[Log], tuple[int, int]]
@@ -14,7 +15,8 @@ FindPeriods = Callable[[Log], tuple[int, int]]
 
 
 def configured_part(axis: Axis, log: Log) -> Log:
-    """The part in [source]; the recording itself without these keys."""
+    """The part in [source], unwrapped; the recording itself without these keys."""
+    log = unwrapped(axis, log)
 
     def periods_in(part: Log) -> tuple[int, int]:
         from livebode.excitation import checked, clipped, extent, filled

@@ -12,11 +12,15 @@ from livebode.preparation import (
     check_uneven,
     clock_facts,
     configured_part,
+    drifting_channels,
     roles_in_doubt,
     steady,
+    trend_event,
     uneven_event,
     uneven_grid,
     uneven_settings,
+    unwrapped,
+    wrap_events,
 )
 from livebode.runtime.estimate import ExaminedRecording
 from livebode.runtime.single_response import SingleResponse
@@ -26,18 +30,25 @@ from livebode.sources import Log, UnevenLog
 
 def examined_uneven(axis: Axis, log: Log) -> ExaminedRecording:
     """Examine the recording, interpolated on a common grid; the spectra are fitted at its own times."""
-    assert isinstance(log, UnevenLog)
     check_uneven(axis)
+    log = unwrapped(axis, log)
+    assert isinstance(log, UnevenLog)
     grid, lines = uneven_grid(axis, log)
     settings = uneven_settings(axis, lines)
     part = configured_part(axis, grid)
     assert isinstance(part, UnevenLog)
+    drifting = [] if axis.tracking.trend == "keep" else drifting_channels(part, settings)
+    drifting = [one for one in drifting if one.channel not in axis.tracking.differenced]
+    differenced = [*axis.tracking.differenced, *(one.channel for one in drifting)]
     values = list(dict.fromkeys([*([settings.schedule] if settings.schedule else []), *_covariates(axis)]))
-    source = UnevenSource(part, settings, values, axis.tracking.differenced)
+    source = UnevenSource(part, settings, values, differenced)
     follower = UnevenTracker(settings, source.layout)
     estimate = SingleResponse.of(axis, follower, source.channels, samples=False)
     signals = [channel.name for channel in source.layout.signals]
     noticed = [uneven_event(part, signals, lines)]
+    noticed += wrap_events(part)
+    if drifting:
+        noticed.append(trend_event(drifting, settings, part.channels, part.first, straight=True))
     noticed += [Event("roles-doubtful", 0, 0.0, message) for message in roles_in_doubt(axis, part, settings)]
     if not axis.tracking.all_periods:
         kept = steady(AlignedLog(part, (), part.first), settings)

@@ -3,6 +3,7 @@ from livebode.sources.delimited import DelimitedRecording as DelimitedRecording
 from livebode.sources.dialect import Dialect as Dialect
 from livebode.sources.dialect import Sample as Sample
 from livebode.sources.expressions import negated as negated
+from livebode.sources.expressions import unwrapping_text as unwrapping_text
 from livebode.sources.extras import missing as missing
 from livebode.sources.formats import HEAD_BYTES as HEAD_BYTES
 from livebode.sources.formats import Format as Format
@@ -37,3 +38,6 @@ from livebode.sources.uneven import ClockGroup as ClockGroup
 from livebode.sources.uneven import UnevenLog as UnevenLog
 from livebode.sources.uneven import uneven_log_of as uneven_log_of
 from livebode.sources.units import split_unit as split_unit
+from livebode.sources.unwrapping import Unwrapping as Unwrapping
+from livebode.sources.unwrapping import Wrap as Wrap
+from livebode.sources.unwrapping import WrapSearch as WrapSearch

@@ -1,4 +1,4 @@
-"""Channels that are computed from others: names, numbers, + - * /, a sign, parentheses and diff; nothing else.
+"""Channels that are computed from others: names, numbers, + - * /, a sign, parentheses, diff and unwrap; no more.
 
 Its operands are in SI units where their units are recognised."""
 
@@ -18,6 +18,7 @@ from livebode.arrays import Floats
 from livebode.core import Block, Channel, QuantityKind, UsageError, read_unit
 from livebode.dataclass import dataclass
 from livebode.sources.units import split_unit
+from livebode.sources.unwrapping import Unwrapping
 
 _UNIT_MAX = 64
 _DERIVATIVE: dict[str, QuantityKind] = {"position": "velocity", "velocity": "acceleration"}
@@ -128,6 +129,8 @@ class Expression:
         Names of the channels in it, each once.
     before
         Samples before the first computed one: how often it differentiates.
+    unwraps
+        Whether it has an unwrap(…).
     unit
         Unit behind it in brackets; empty if its unit follows from the channels.
     """
@@ -138,11 +141,19 @@ class Expression:
     names: tuple[str, ...]
     before: int
     unit: str = ""
+    unwraps: bool = False
 
-    def values(self, data: Mapping[str, Floats], rate_hz: float) -> Floats:
-        """Its samples from those of its channels, shape (samples,); the first `before` ones are NaN."""
+    def values(
+        self, data: Mapping[str, Floats], rate_hz: float, turns: dict[int, Unwrapping] | None = None, repeated: int = 0
+    ) -> Floats:
+        """Its samples from those of its channels, shape (samples,); the first `before` ones are NaN.
+
+        `turns` is what it remembers of the previous samples, of which the last `repeated` ones come again in the next
+        ones; None where these are all samples.
+        """
+        by = _Arithmetic(rate_hz, {} if turns is None else turns, repeated)
         with np.errstate(all="ignore"):  # a division by 0 gives a sample that is not finite, as in a file
-            found = _walk(self.tree, lambda node: data[_name(node, self.quoted)], _Arithmetic(rate_hz))
+            found = _walk(self.tree, lambda node: data[_name(node, self.quoted)], by)
         return np.asarray(found, dtype=np.float64) * read_unit(self.unit).factor
 
     def channel(self, channels: Mapping[str, Channel]) -> Channel:
@@ -171,6 +182,8 @@ def parse_expression(text: str) -> Expression:
 
     >>> parse_expression("pos + 0.35*`angle (rad)`").names, parse_expression("diff(x) [m/s]").unit
     (('pos', 'angle (rad)'), 'm/s')
+    >>> parse_expression("unwrap(angle, 360) / 2").values({"angle": np.array([358.0, 2.0])}, 1000.0)
+    array([179., 181.])
 
     Raises
     ------
@@ -192,7 +205,8 @@ def parse_expression(text: str) -> Expression:
     before = _check(tree, quoted, names, 0)
     if not names:
         raise ExpressionSyntaxError("there is no channel in it")
-    return Expression(text, tree, quoted, tuple(names), before, unit)
+    unwraps = any(isinstance(node, ast.Call) and _unwrapped(node) is not None for node in ast.walk(tree))
+    return Expression(text, tree, quoted, tuple(names), before, unit, unwraps)
 
 
 def negated(name: str) -> str:
@@ -213,6 +227,20 @@ def negated(name: str) -> str:
     return f"-({name})"
 
 
+def unwrapping_text(name: str, turn: float) -> str:
+    """The expression of a channel that is unwrapped.
+
+    >>> unwrapping_text("enc1", 65536.0), unwrapping_text("angle (deg)", 360.0)
+    ('unwrap(enc1, 65536)', 'unwrap(`angle (deg)`, 360)')
+    """
+    number = f"{turn:.16g}"
+    try:
+        plain = isinstance(parse_expression(name).tree, ast.Name | ast.Attribute)
+    except ExpressionSyntaxError:
+        plain = False
+    return f"unwrap({name if plain else f'`{name}`'}, {number})"
+
+
 def _check(node: ast.expr, quoted: Mapping[str, str], names: dict[str, None], depth: int) -> int:
     """The number of samples that it needs before the first; collects the names."""
     if depth > DEPTH_MAX:
@@ -231,7 +259,24 @@ def _check(node: ast.expr, quoted: Mapping[str, str], names: dict[str, None], de
             return max(_check(part, quoted, names, depth + 1) for part in (left, right))
         case ast.Call(func=ast.Name(id="diff"), args=[inner], keywords=[]):
             return _check(inner, quoted, names, depth + 1) + 1
-    raise ExpressionSyntaxError("only names, numbers, + - * / and diff(…) are possible, and other names need backticks")
+        case ast.Call() if (found := _unwrapped(node)) is not None:
+            inner, turn = found
+            if not (math.isfinite(turn) and turn > 0):
+                raise ExpressionSyntaxError("the turn in unwrap(…) is not a positive number")
+            return _check(inner, quoted, names, depth + 1)
+    raise ExpressionSyntaxError(
+        "only names, numbers, + - * /, diff(…) and unwrap(…, turn) are possible, and other names need backticks"
+    )
+
+
+def _unwrapped(node: ast.Call) -> tuple[ast.expr, float] | None:
+    """What is unwrapped, and its turn; None for another call."""
+    match node:
+        case ast.Call(
+            func=ast.Name(id="unwrap"), args=[inner, ast.Constant(value=int() | float() as turn)], keywords=[]
+        ):
+            return inner, _number(turn)
+    return None
 
 
 def _name(node: ast.expr, quoted: Mapping[str, str]) -> str:
@@ -257,14 +302,17 @@ class _Arithmetic:
         staticmethod(f) for f in (np.add, np.subtract, np.multiply, np.divide, np.negative)
     )
 
-    def __init__(self, rate_hz: float) -> None:
-        self._rate_hz = rate_hz
+    def __init__(self, rate_hz: float, turns: dict[int, Unwrapping], repeated: int) -> None:
+        self._rate_hz, self._turns, self._repeated = rate_hz, turns, repeated
 
     def number(self, value: float) -> Any:
         return np.float64(value)
 
     def diff(self, x: Any) -> Any:
         return np.diff(x, prepend=np.nan) * self._rate_hz if np.ndim(x) else np.float64(0.0)
+
+    def unwrap(self, x: Any, turn: float, node: int) -> Any:
+        return self._turns.setdefault(node, Unwrapping(turn)).process(x, self._repeated) if np.ndim(x) else x
 
 
 class _Units:
@@ -279,6 +327,9 @@ class _Units:
     def negative(self, x: Any) -> Any:
         return x
 
+    def unwrap(self, x: Any, _turn: float, _node: int) -> Any:
+        return x
+
 
 def _walk(node: ast.expr, of_name: Callable[[ast.expr], Any], by: _Arithmetic | _Units) -> Any:
     match node:
@@ -290,6 +341,8 @@ def _walk(node: ast.expr, of_name: Callable[[ast.expr], Any], by: _Arithmetic | 
         case ast.BinOp(op=op, left=left, right=right):
             operation = {ast.Add: by.add, ast.Sub: by.subtract, ast.Mult: by.multiply, ast.Div: by.divide}[type(op)]
             return operation(_walk(left, of_name, by), _walk(right, of_name, by))
+        case ast.Call(args=[inner, ast.Constant(value=turn)]):
+            return by.unwrap(_walk(inner, of_name, by), float(turn), id(node))  # type: ignore[arg-type]
         case ast.Call(args=[inner]):
             return by.diff(_walk(inner, of_name, by))
     return of_name(node)
@@ -304,12 +357,16 @@ def computed_blocks(
     """
     before = max(expression.before for expression in expressions.values())
     held, stop = np.zeros((0, 0)), -1
+    turns = {name: dict[int, Unwrapping]() for name in expressions}
     for block in blocks:
         follows = block.start == stop and not block.gap
         data = np.concatenate([held, block.data], axis=1) if follows and before else block.data
         signals = dict(zip(block.names, data))
         rows = [
-            expressions[name].values(signals, block.rate_hz) if name in expressions else signals[name] for name in names
+            expressions[name].values(signals, block.rate_hz, turns[name], before)
+            if name in expressions
+            else signals[name]
+            for name in names
         ]
         first = block.stop - data.shape[1] + before
         gap = block.gap if not follows else False

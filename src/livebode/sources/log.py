@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from copy import copy
+from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
@@ -18,6 +19,7 @@ from livebode.sources.naming import explained, found_channel, resolve
 from livebode.sources.quantities import DeclaredQuantities, in_si
 from livebode.sources.recording import Chunk, Column, Recording, Skipped, guarded, located, stacked
 from livebode.sources.timing import Clock, Timing
+from livebode.sources.unwrapping import Unwrapping, Wrap, WrapSearch
 
 BLOCK_SAMPLES_MAX = 1 << 24
 _NAMES_SHOWN = 8
@@ -66,6 +68,8 @@ class Log:
         """Number of the first sample that `blocks` reads."""
         self._stop: int | None = None
         self._named: tuple[Channel, ...] = ()
+        self.wraps: Mapping[str, Wrap] = {}
+        """What `unwrapping` unwraps, by column."""
 
     def __repr__(self) -> str:
         names = ", ".join(channel.name for channel in self.channels[:_NAMES_SHOWN])
@@ -262,7 +266,8 @@ class Log:
             return self._computed(found, limit)
         columns = [one for one in found.values() if isinstance(one, Column)]
         labels = tuple(self._label(column, name) for name, column in zip(names, columns))
-        return self._within(self._cut(self._read(columns, limit), labels, limit))
+        turns = [self.wraps[column.name].turn if column.name in self.wraps else None for column in columns]
+        return self._within(_unwrapped(self._cut(self._read(columns, limit), labels, limit), turns))
 
     def __getitem__(self, name: str) -> NDArray[np.float64]:
         """All samples of one channel in memory, shape (samples,), with NaN where some are missing; errors as `blocks`.
@@ -298,6 +303,37 @@ class Log:
         chosen = copy(self)
         chosen._named = self._labels(self._found([name for name in names if name not in known]))
         return chosen
+
+    def unwrapping(self, wraps: Mapping[str, Wrap]) -> Log:
+        """The same recording, in which these columns are unwrapped, also where channels are computed from them."""
+        chosen = copy(self)
+        chosen.wraps = wraps
+        return chosen
+
+    def search_wraps(self, names: Sequence[str]) -> dict[str, Wrap]:
+        """The columns that wrap (`WrapSearch`) of those that these channels are, or are computed from, in all samples.
+
+        Not of a channel that unwraps itself, and not of one that is not in the file.
+        """
+        found = [one for name in names if self.has(name) for one in self._found([name]).values()]
+        columns = {one.name: one for one in found if isinstance(one, Column)}
+        for one in found:
+            if isinstance(one, Expression) and not one.unwraps:
+                columns |= {column.name: column for column in self._columns_of(one).values()}
+        if not columns:
+            return {}
+        labels = {name: self._label(column, name) for name, column in columns.items()}
+        searches = {name: WrapSearch() for name in columns}
+        for rows in self._rows_of(list(columns)):
+            for name, x in rows.items():
+                searches[name].process(x / labels[name].factor)
+        wraps = {name: search.finish(labels[name]) for name, search in searches.items()}
+        return {name: wrap for name, wrap in wraps.items() if wrap is not None}
+
+    def _rows_of(self, columns: Sequence[str]) -> Iterator[dict[str, NDArray[np.float64]]]:
+        """The samples of these columns as they are recorded, in parts."""
+        for block in self.blocks(columns):
+            yield {name: block[name] for name in columns}
 
     def as_written(self) -> Log:
         """The same recording in the units of the file, for a reader that converts them itself."""
@@ -383,6 +419,17 @@ class Log:
         if row == 0:
             path = str(self.path)
             raise RecordingError("empty", f"{path} has no samples", "check that the recording is complete", path=path)
+
+
+def _unwrapped(blocks: Iterator[Block], turns: Sequence[float | None]) -> Iterator[Block]:
+    """The blocks with some rows unwrapped, by their turns; the others have None."""
+    if not any(turns):
+        yield from blocks
+        return
+    each = [None if turn is None else Unwrapping(turn) for turn in turns]
+    for block in blocks:
+        rows = [x if one is None else one.process(x) for one, x in zip(each, block.data)]
+        yield replace(block, data=np.array(rows))
 
 
 def pieces(first: int, last: int, cuts: NDArray[np.int64], limit: int) -> Iterator[tuple[int, int]]:

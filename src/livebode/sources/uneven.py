@@ -22,6 +22,7 @@ from livebode.sources.stamps import Stamps, stamps_of
 from livebode.sources.steps import exact_rate_hz
 from livebode.sources.timing import Clock, find_time, rate_in_file
 from livebode.sources.units import split_unit
+from livebode.sources.unwrapping import Unwrapping
 
 _ROWS = 1 << 14
 
@@ -201,10 +202,21 @@ class UnevenLog(Log):
         for name, one in found.items():
             parts |= self._columns_of(one) if isinstance(one, Expression) else {name: one}
         labels = [self._label(column, name) for name, column in parts.items()]
+        wraps = {name: Unwrapping(self.wraps[c.name].turn) for name, c in parts.items() if c.name in self.wraps}
+        turns = {name: dict[int, Unwrapping]() for name in found}
         for time, *values in self._read([clock, *parts.values()], _ROWS):
             data = dict(zip(parts, in_si(stacked(values), labels)))
-            rows = [one.values(data, np.nan) if isinstance(one, Expression) else data[n] for n, one in found.items()]
+            data |= {name: one.process(data[name]) for name, one in wraps.items()}
+            rows = [
+                one.values(data, np.nan, turns[name]) if isinstance(one, Expression) else data[name]
+                for name, one in found.items()
+            ]
             yield stamps.since(_exact(time), self._reference), np.array(rows)
+
+    def _rows_of(self, columns: Sequence[str]) -> Iterator[dict[str, Floats]]:
+        for name in columns:
+            for _, (values,) in self.pieces([name]):
+                yield {name: values}
 
     def blocks(self, channels: Sequence[str] | None = None, block_samples: int | None = None) -> Iterator[Block]:
         """Interpolated samples of `channels` on the common grid; see `Log.blocks`."""

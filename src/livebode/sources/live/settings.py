@@ -128,6 +128,8 @@ class SourceKeys(TypedTable, extra="forbid", strict=True, allow_inf_nan=False):
         End of that part, in the same form; the sample at this moment is excluded. Default: its last sample.
     skip_periods
         Number of periods that are left out at the beginning of the excitation in that part.
+    unwrap
+        Unwrap the outputs and the schedule of a recording where they are angles or counters that wrap.
     dbc
         DBC file that defines the signals of CAN frames, live or in a recording, relative to this file.
     follow
@@ -166,6 +168,7 @@ class SourceKeys(TypedTable, extra="forbid", strict=True, allow_inf_nan=False):
     from_: Limit | None = Field(default=None, alias="from")
     to: Limit | None = None
     skip_periods: Annotated[int, Field(ge=0, le=1 << 40)] = 0
+    unwrap: bool = True
     dbc: File | None = None
     follow: bool = False
     replay: File | None = None
