@@ -84,6 +84,18 @@ def test_a_transient_at_the_start_is_left_out(recorded: np.ndarray) -> None:
         assert found(holey) == []
 
 
+def test_an_output_that_creeps_is_reported_once_with_the_remedy_of_a_live_run(recorded: np.ndarray) -> None:
+    data = recorded.copy()
+    data[2] += 0.5 * np.arange(data.shape[1]) / WINDOW
+    (event,) = found(data)
+    assert event.kind == "signal-drifts"
+    assert "'velocity' drifts by 0.5 from window to window" in event.message
+    assert "tracking.differenced" in event.message
+    assert found(data, trends=False) == []
+    differenced = Settings(lines=LINES, output="velocity", input="u", excitation="w", differenced=("velocity",))
+    assert found(data, differenced) == []
+
+
 def test_a_transient_is_judged_only_where_nothing_was_excited_before(recorded: np.ndarray) -> None:
     silent, burst = np.zeros((3, 36_000)), recorded[:, : 10 * WINDOW]
     late = np.hstack([silent, np.zeros_like(burst), silent, np.zeros_like(burst), np.zeros((3, 2000)), recorded])

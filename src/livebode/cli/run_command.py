@@ -32,6 +32,7 @@ from livebode.locations import location
         "forgetting": ("--forgetting", ""),
         "noise": ("--noise", ""),
         "differenced": ("--difference", "CHANNEL"),
+        "trend": ("--trend", ""),
         "spikes": ("--spikes", "CHANNEL"),
         "accept_roles": ("--accept-roles", ""),
         "all_periods": ("--all-periods", ""),

@@ -205,7 +205,10 @@ class TrackingSection(ConfigurationSection):
         Source of the bounds. "auto": the scatter between periods and, where the schedule moves, the detection lines
         (non-excited bins). "periods": always the scatter. "quiet": the larger of the two at standstill.
     differenced
-        Channels that are differenced before the DFT: a position that drifts.
+        Channels that are differenced before the DFT: a position that drifts. Their trend is not subtracted.
+    trend
+        Whether the trend of a signal that drifts, its moving mean over a window, is subtracted before the DFT, in a
+        recording. "auto": where it matters at a line, at standstill; "subtract": always; "keep": never.
     hann
         Use a Hann window, from three bins; for an axis in motion.
     spikes
@@ -228,6 +231,7 @@ class TrackingSection(ConfigurationSection):
     forgetting: Annotated[float, Field(gt=0, le=1)] | None = None
     noise: Literal["auto", "periods", "quiet"] = "auto"
     differenced: list[str] = []
+    trend: Literal["auto", "subtract", "keep"] = "auto"
     hann: bool = False
     spikes: list[str] = []
     dtype: Literal["float64", "float32"] = "float64"

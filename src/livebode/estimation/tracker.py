@@ -18,6 +18,7 @@ from livebode.estimation.silence_search import HumSpan
 from livebode.estimation.spectra import LineSpectra
 from livebode.estimation.stream_estimator import Centre, InputStatistics, StreamEstimator, signals_of
 from livebode.estimation.tracker_settings import Settings
+from livebode.estimation.trend import Trend
 
 NOTHING: Integers = np.zeros((0, 2), dtype=np.int64)
 """No stretch is set aside."""
@@ -101,6 +102,7 @@ class Tracker(StreamEstimator[InputStatistics]):
         self._repeating = RepeatingErrors(settings, self._events) if repeating else None
         self._watch = InputStatistics(self._events, window)
         self._end, self._aside = (0, 0.0), NOTHING
+        self._trend: Trend | None = None
         self._parts = {
             "spectra": self._spectra,
             "lines": self._lines,
@@ -130,6 +132,10 @@ class Tracker(StreamEstimator[InputStatistics]):
         """Where the silences of a whole recording show hum: windows that overlap a span do not count at its line."""
         if self._repeating is not None:
             self._repeating.know_hum(spans)
+
+    def know_trend(self, trend: Trend) -> None:
+        """The trend of a whole recording, which is subtracted from the signals; the schedule is not changed."""
+        self._trend = trend
 
     def leave_out(self, samples: NDArray[np.int64]) -> None:
         """Numbers of samples, ascending: no window that contains one of them counts."""
@@ -161,6 +167,8 @@ class Tracker(StreamEstimator[InputStatistics]):
         s = self.settings
         channels, schedule = signals_of(block, s)
         stop = block.stop
+        if self._trend is not None:
+            channels = channels - self._trend.of([s.channel(role) for role in self._roles], block.start, stop)
         if self._watch.starts(block):
             self._spectra.restart(block.start)
             self._centre.restart()

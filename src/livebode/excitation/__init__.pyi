@@ -35,6 +35,7 @@ from livebode.excitation.prepare import filled as filled
 from livebode.excitation.significance import find_lines as find_lines
 from livebode.excitation.slips import Slip as Slip
 from livebode.excitation.slips import find_slips as find_slips
+from livebode.excitation.slow_part import slow_part as slow_part
 from livebode.excitation.stepped import stepped_lines as stepped_lines
 from livebode.excitation.stepped import stepped_sine as stepped_sine
 from livebode.excitation.transient import leading as leading

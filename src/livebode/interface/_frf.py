@@ -47,6 +47,7 @@ _ARGUMENTS = {
     "signals.output": "y",
     "rate_hz": "fs",
     " (--estimator lpm)": "",
+    "; --trend keep leaves it in": "",
     ", or check the recording with `livebode inspect`": "",
     'ignore the column (time = "none")': "give the values alone, as u.to_numpy()",
     "time column": "index",

@@ -44,6 +44,11 @@ from livebode.preparation.recordings import check_same as check_same
 from livebode.preparation.recordings import realisations as realisations
 from livebode.preparation.roles import ROLES as ROLES
 from livebode.preparation.roles import suspicions as suspicions
+from livebode.preparation.trend import ChannelTrend as ChannelTrend
+from livebode.preparation.trend import TrendSearch as TrendSearch
+from livebode.preparation.trend import live_trend_message as live_trend_message
+from livebode.preparation.trend import trend_event as trend_event
+from livebode.preparation.trend import trend_of as trend_of
 from livebode.preparation.uneven_plan import check_uneven as check_uneven
 from livebode.preparation.uneven_plan import clock_facts as clock_facts
 from livebode.preparation.uneven_plan import uneven_event as uneven_event

@@ -10,12 +10,13 @@ import tomli_w
 from livebode.configuration import Axis, check_fit
 from livebode.core import Lines, LivebodeError
 from livebode.dataclass import dataclass
-from livebode.estimation import DETECTION_LINES_MIN
+from livebode.estimation import DETECTION_LINES_MIN, Settings
 from livebode.excitation import recognise
 from livebode.language import Message
 from livebode.preparation.followers import make_settings
 from livebode.preparation.nonperiodic import suits_lpm
 from livebode.preparation.plan import beginning, roles_in_doubt
+from livebode.preparation.trend import drifting_channels
 from livebode.sources import Log
 
 if TYPE_CHECKING:
@@ -144,6 +145,21 @@ def settled(log: Log, tables: Tables, reasons: Mapping[str, str]) -> Settled:
     comments["lines", "window"] = Message(
         "samples: {s:.6g} s, {periods}", s=lines.window / log.rate_hz, periods=periods
     )
+    tables, about = _with_trend(log, tables, settings)
+    comments |= about
     order = ("source", "signals", "lines")
     head = {name: tables[name] if name != "lines" else found for name in order}
     return Settled(head | {name: table for name, table in tables.items() if name not in order}, comments, doubts)
+
+
+def _with_trend(log: Log, tables: Tables, settings: Settings) -> tuple[Tables, dict[tuple[str, str], str]]:
+    """The tables with what is done to signals that drift, and its comment: a live source cannot look ahead."""
+    drifting = drifting_channels(log, settings)
+    if not drifting:
+        return tables, {}
+    names = [one.channel for one in drifting]
+    key, value = ("trend", "subtract") if "log" in tables["source"] else ("differenced", names)
+    comment = Message("{channels} drifts", channels=Message.conjunction(names))
+    if len(names) > 1:
+        comment = Message("{channels} drift", channels=Message.conjunction(names))
+    return tables | {"tracking": tables["tracking"] | {key: value}}, {("tracking", key): comment}

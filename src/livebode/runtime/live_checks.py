@@ -15,8 +15,11 @@ from livebode.estimation import Settings
 from livebode.language import Message
 from livebode.preparation import (
     ROLES,
+    ChannelTrend,
     SlipSearch,
+    TrendSearch,
     bridged,
+    live_trend_message,
     role_spectra,
     suspicions,
     transient_event,
@@ -42,6 +45,8 @@ class LiveChecks:
         Channels of the Blocks that are used.
     roles, transient
         Whether the roles are judged, and whether the run may begin with a transient.
+    trends
+        Whether signals that drift are reported, with the roles.
     judged
         Called once, when a stretch was judged.
     phase
@@ -56,11 +61,13 @@ class LiveChecks:
         *,
         roles: bool,
         transient: bool,
+        trends: bool = True,
         judged: Callable[[], None] = lambda: None,
         phase: float = 0.0,
     ) -> None:
         self._settings, self._channels, self._report_judged = settings, channels, judged
         self._roles, self._transient = roles and settings.periodic, transient and settings.periodic
+        self._trends = trends
         lines = settings.lines
         self._size = min(max(_WINDOWS * lines.window, round(_SECONDS * lines.rate_hz)), _SAMPLES_MAX) + 1
         self._stretch = _Stretch()
@@ -123,7 +130,9 @@ class LiveChecks:
         stretch, self._complete = self._complete, None
         if stretch is not None and (self._roles or self._transient):
             begun = stretch.start if self._begun is None else self._begun
-            self._judgement = _thread().submit(_judged, stretch, self._settings, self._channels, self._roles, begun)
+            self._judgement = _thread().submit(
+                _judged, stretch, self._settings, self._channels, self._roles, self._roles and self._trends, begun
+            )
             self._known_at = sample + round(_JUDGING_S * self._settings.lines.rate_hz)
 
     def _findings(self) -> Iterator[Event]:
@@ -186,7 +195,9 @@ class _Judgement:
     final: bool = True
 
 
-def _judged(stretch: _CompleteStretch, settings: Settings, channels: list[str], roles: bool, begun: int) -> _Judgement:
+def _judged(
+    stretch: _CompleteStretch, settings: Settings, channels: list[str], roles: bool, trends: bool, begun: int
+) -> _Judgement:
     """The judgement of a stretch of a run that began with sample `begun`."""
     start, time_s = stretch.start, stretch.time_s
     signals = dict(zip(channels, stretch.data))
@@ -198,9 +209,19 @@ def _judged(stretch: _CompleteStretch, settings: Settings, channels: list[str], 
         return _Judgement(final=False)  # the excitation began in this stretch, not with the next one
     doubts = suspicions(by_role, settings, stretch.channels) if roles else []
     events = [Event("roles-doubtful", start, time_s, one.sentence) for one in doubts]
-    if stretch.transient and (periods := transient_periods(signals, settings)):
+    periods = transient_periods(signals, settings)
+    if stretch.transient and periods:
         events.append(transient_event(periods, settings, first=start, time_s=time_s, begun=begun))
+    if trends and (drifting := _drifting(stretch, settings, channels, periods)):
+        events.append(Event("signal-drifts", start, time_s, live_trend_message(drifting, stretch.channels)))
     return _Judgement(tuple(events))
+
+
+def _drifting(stretch: _CompleteStretch, settings: Settings, channels: list[str], transient: int) -> list[ChannelTrend]:
+    """The channels that drift in a stretch behind its transient; its periods begin anywhere."""
+    search = TrendSearch(settings, 0)
+    search.process(Block(stretch.data, tuple(map(Channel, channels)), settings.lines.rate_hz))
+    return search.finish(transient)
 
 
 @cache

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, Protocol
+
+import numpy as np
 
 from livebode import estimation, fitting, preparation
 from livebode.configuration import Axis, with_log
 from livebode.core import Block, Channel, Event, RecordingError
 from livebode.dataclass import dataclass
-from livebode.estimation import Follower, Tracker, hum_events, hum_spans
+from livebode.estimation import Follower, Settings, Tracker, hum_events, hum_spans
 from livebode.language import Message
 from livebode.locations import Location, local_copy
 from livebode.preparation import (
@@ -18,6 +20,7 @@ from livebode.preparation import (
     ChannelCheck,
     SilencesOfRecording,
     SteadySearch,
+    TrendSearch,
     configured_part,
     early_spikes,
     hop_event,
@@ -26,6 +29,8 @@ from livebode.preparation import (
     roles_in_doubt,
     slip_event,
     slips_of,
+    trend_event,
+    trend_of,
     window_in_doubt,
 )
 from livebode.records import content_sha256
@@ -80,31 +85,68 @@ def examined(axis: Axis, log: Log, follower: Follower, shift: int = 0) -> Examin
     slips = slips_of(log, settings)
     if slips:
         noticed.append(slip_event(slips, settings))
-    source = whole = AlignedLog(log, slips, log.first)
-    periods = silences = None
+    whole, periods = AlignedLog(log, slips, log.first), None
     if settings.periodic and not axis.tracking.all_periods and axis.motion is None:
         periods = SteadySearch(settings, whole.first)
-    if isinstance(follower, Tracker):
-        silences = SilencesOfRecording(settings, whole.first)
-    _search(whole, [search for search in (periods, silences) if search is not None])
+    of_tracker = _TrackerSearches(axis, settings, whole.first) if isinstance(follower, Tracker) else None
+    _search(whole, [*([periods] if periods else []), *(of_tracker.each if of_tracker else [])])
+    source, left_out = whole, np.zeros(0, dtype=np.int64)
     if periods is not None:
         kept = periods.finish()
-        source, noticed = replace(source, first=kept.first), noticed + kept.noticed
-        if kept.left_out.size and isinstance(follower, Tracker):
-            follower.leave_out(kept.left_out + shift)
-    if silences is not None and isinstance(follower, Tracker):
-        spans = hum_spans(silences.finish(), settings.lines, average=settings.average)
-        noticed += hum_events(spans, settings.lines, source.first)
-        follower.know_hum([span.shifted(shift) for span in spans])
-        follower.know_spikes(early_spikes(source, settings) + shift)
+        source, left_out, noticed = replace(source, first=kept.first), kept.left_out, noticed + kept.noticed
     found = {"format": log.format, "rate_from": log.rate_origin, "phase_slips": len(slips)}
     found |= {"left_out_samples": source.first - log.first, "clock": log.clock_kind}
     if log.is_part:
         found["part"] = {"first": log.first, "stop": log.stop}
+    if of_tracker is not None and isinstance(follower, Tracker):
+        follower.leave_out(left_out + shift)
+        noticed += of_tracker.inform(follower, source, shift)
+        found |= of_tracker.found
     return Examined(source, noticed, found)
 
 
-def _search(source: AlignedLog, searches: Sequence[SteadySearch | SilencesOfRecording]) -> None:
+class _TrackerSearches:
+    """What a Tracker knows of a whole recording before it starts: hum in silences, early spikes, and trends."""
+
+    def __init__(self, axis: Axis, settings: Settings, first: int) -> None:
+        self._settings, self._first, self._always = settings, first, axis.tracking.trend == "subtract"
+        self._silences = SilencesOfRecording(settings, first)
+        self._trends = None if axis.tracking.trend == "keep" else TrendSearch(settings, first)
+        self.found = dict[str, Any]()
+        """Entries of run.json."""
+
+    @property
+    def each(self) -> list[_Search]:
+        """The searches."""
+        return [self._silences, *([self._trends] if self._trends else [])]
+
+    def inform(self, tracker: Tracker, source: AlignedLog, shift: int) -> list[Event]:
+        """Give the tracker what was found, in a recording that begins at its steady state; events about it."""
+        settings = self._settings
+        spans = hum_spans(self._silences.finish(), settings.lines, average=settings.average)
+        tracker.know_hum([span.shifted(shift) for span in spans])
+        tracker.know_spikes(early_spikes(source, settings) + shift)
+        noticed = hum_events(spans, settings.lines, source.first)
+        if self._trends is None:
+            return noticed
+        drifting = self._trends.finish((source.first - self._first) // settings.lines.window)
+        names = self._trends.names if self._always else [one.channel for one in drifting]
+        if names:
+            tracker.know_trend(trend_of(source, names, settings.lines.window).shifted(shift))
+            self.found["trend_subtracted"] = names
+            noticed += [] if self._always else [trend_event(drifting, settings, source.channels, source.first)]
+        return noticed
+
+
+class _Search(Protocol):
+    """A search in the samples of a recording."""
+
+    channels: list[str]
+
+    def process(self, block: Block) -> None: ...
+
+
+def _search(source: AlignedLog, searches: Sequence[_Search]) -> None:
     """Give the whole of a recording to these searches."""
     channels = list(dict.fromkeys(name for search in searches for name in search.channels))
     for block in source.blocks(channels) if channels else ():
@@ -175,6 +217,8 @@ def _examined_one_by_one(axis: Axis, logs: Sequence[Log]) -> ExaminedRecording:
         "realisations": differ,
     }
     found.pop("part", None)
+    if subtracted := list(dict.fromkeys(name for part in parts for name in part.of.found.get("trend_subtracted", ()))):
+        found["trend_subtracted"] = subtracted
     date = recorded([_span(part) for part in parts])
     return ExaminedRecording(
         axis,

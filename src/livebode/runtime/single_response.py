@@ -288,6 +288,7 @@ class SingleResponse(Estimate):
             self.channels,
             roles=not counts.judged,
             transient=transient,
+            trends=axis.tracking.trend != "keep",
             judged=counts.judge,
             phase=self.run.recorder.phase,
         )

@@ -1,0 +1,70 @@
+"""Trend: what a Tracker subtracts from signals that drift, before their DFT."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from livebode.arrays import Floats
+from livebode.dataclass import dataclass
+
+_POINTS = 4  # of a cubic
+
+
+@dataclass(frozen=True, eq=False)
+class TrendStretch:
+    """Trend of consecutive samples, as values that follow each other by `step` samples from sample `first` on.
+
+    `values` is (channels, values), with four values or more; the stretch ends with sample `stop` − 1.
+    """
+
+    first: int
+    stop: int
+    step: int
+    values: Floats
+
+    def at(self, samples: Floats) -> Floats:
+        """The cubic through the four nearest values at these samples, (channels, samples)."""
+        position = (samples - self.first) / self.step
+        place = np.clip(position.astype(np.int64), 1, self.values.shape[1] - _POINTS + 1)
+        t, v = position - place, self.values
+        weights = (
+            -t * (t - 1) * (t - 2) / 6,
+            (t + 1) * (t - 1) * (t - 2) / 2,
+            -(t + 1) * t * (t - 2) / 2,
+            (t + 1) * t * (t - 1) / 6,
+        )
+        return np.asarray(sum(weight * v[:, place + number - 1] for number, weight in enumerate(weights)))
+
+
+@dataclass(frozen=True, eq=False)
+class Trend:
+    """Trend of some channels over a recording.
+
+    Attributes
+    ----------
+    channels
+        Their names.
+    stretches
+        Ascending and apart; between them it is not known, and 0.
+    """
+
+    channels: tuple[str, ...]
+    stretches: Sequence[TrendStretch] = ()
+
+    def of(self, names: Sequence[str | None], start: int, stop: int) -> Floats:
+        """Trend of these channels at the samples start … stop − 1, (channels, samples)."""
+        known = np.zeros((len(self.channels) + 1, stop - start))
+        for stretch in self.stretches:
+            first, last = max(start, stretch.first), min(stop, stretch.stop)
+            if first < last:
+                known[:-1, first - start : last - start] = stretch.at(np.arange(first, last, dtype=np.float64))
+        rows = [self.channels.index(name) if name in self.channels else -1 for name in names]
+        return np.asarray(known[rows])
+
+    def shifted(self, samples: int) -> Trend:
+        """The trend of a recording whose samples have numbers that are larger by so many."""
+        moved = [replace(one, first=one.first + samples, stop=one.stop + samples) for one in self.stretches]
+        return Trend(self.channels, moved)
