@@ -1,7 +1,8 @@
 """Coverage of the bounds where errors repeat with the excitation, or noise is not alike at all lines.
 
 `python -m studies.repeating [case …]` prints for each case the share of errors within the 1σ and 2σ bounds of a single
-window, of an average and of the mean over a run, beside the targets, and the lines that are not valid with the reason.
+window, of an average and of the mean over a run, beside the targets, the width of sigma of the average (its rms over
+that of the errors, both relative to the response), and the lines that are not valid with the reason.
 """
 
 from __future__ import annotations
@@ -13,7 +14,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.signal import lfilter
 
-from livebode import Block, Lines, Response, Settings, Tracker, multisine
+from livebode import Block, Channel, Lines, Response, Settings, Tracker, multisine
+from livebode.core import QuantityKind
 from livebode.excitation import odd_lines
 from livebode.fitting import mean_response
 from livebode.simulation import (
@@ -50,6 +52,7 @@ class Case:
     options: dict[str, str] = field(default_factory=dict)
     damping: float = two_mass_loop.BS
     silent: int = 0  # periods without excitation at the beginning
+    output: QuantityKind = "velocity"
 
 
 def simulated(name: str, **options: object) -> Case:
@@ -76,6 +79,8 @@ def hum(frequency_hz: float, harmonics: float, level: float = 0.05) -> Noise:
 
 
 QUIET = {"noise": "quiet"}
+OTHERS: tuple[QuantityKind, ...] = ("position", "acceleration")
+DERIVATIVE = {"position": -1, "velocity": 0, "acceleration": 1}
 CASES = (
     *(simulated(f"encoder of {n} bits", sensor=Sensor(encoder_counts_per_turn=2**n)) for n in (12, 14, 16, 18, 20)),
     simulated("backlash of 10 µm", faults=(Backlash(gap_m=1e-5),)),
@@ -87,6 +92,16 @@ CASES = (
         "friction of 2 N under noise",
         friction=Friction(load_coulomb_n=2.0),
         sensor=Sensor(noise_rad_per_s=0.1),
+    ),
+    *(
+        replace(case, name=f"{output}: {case.name}", output=output)
+        for case in (
+            simulated("Coulomb friction of 2 N", friction=Friction(load_coulomb_n=2.0)),
+            simulated("Coulomb friction of the motor", friction=Friction(motor_coulomb_n_m=0.04)),
+            simulated("backlash of 10 µm", faults=(Backlash(gap_m=1e-5),)),
+            simulated("encoder of 16 bits", sensor=Sensor(encoder_counts_per_turn=2**16)),
+        )
+        for output in OTHERS
     ),
     Case("hum on a line, with harmonics", noise=hum(50, 0.2), lines=ON_MAINS),
     Case("hum on a line, seen before the excitation", noise=hum(50, 0), lines=ON_MAINS, silent=4),
@@ -100,9 +115,10 @@ CASES = (
 
 @dataclass(frozen=True)
 class Found:
-    """Of one case: for each way the coverage of 1σ and 2σ at valid lines, which share is valid, and the reasons."""
+    """Of one case: for each way the coverage of 1σ and 2σ at valid lines, the width, which share is valid, and why."""
 
     coverage: dict[str, tuple[float, float]]
+    width: float
     valid: float
     reasons: dict[str, list[float]]
 
@@ -118,17 +134,22 @@ def measure(case: Case, runs: int | None = None) -> Found:
     hits: dict[str, list[Floats]] = {}
     valid: list[Floats] = []
     reasons: dict[str, set[float]] = {}
+    squares = np.zeros(2)
     for seed in range(runs):
         block = recorded(case, seed)
         for way, (response, tracker) in ways(case, block).items():
             error = np.abs(response.value - truth)[response.valid]
             hits.setdefault(way, []).append(np.stack([error <= response.bound(c)[response.valid] for c in (1, 2)]))
             valid.append(response.valid)
+            if way == "average":
+                relative = np.stack([response.sigma[response.valid], error]) / np.abs(truth[response.valid])
+                squares += np.sum(relative**2, axis=1)
             for reason, lines_hz in tracker.found()["judged"]["invalid_lines_hz"].items():
                 reasons.setdefault(reason, set()).update(lines_hz)
     together = {way: np.concatenate(rows, axis=1) for way, rows in hits.items()}
     coverage = {way: tuple(h.mean(axis=1)) if h.size else (np.nan, np.nan) for way, h in together.items()}
-    return Found(coverage, float(np.mean(valid)), {name: sorted(lines_hz) for name, lines_hz in reasons.items()})
+    width = float(np.sqrt(squares[0] / squares[1])) if squares[1] else np.nan
+    return Found(coverage, width, float(np.mean(valid)), {name: sorted(lines_hz) for name, lines_hz in reasons.items()})
 
 
 def ways(case: Case, block: Block) -> dict[str, tuple[Response, Tracker]]:
@@ -149,7 +170,8 @@ def ways(case: Case, block: Block) -> dict[str, tuple[Response, Tracker]]:
 def truth_of(case: Case) -> Complex:
     f = case.lines.frequency_hz
     if case.axis is not None:
-        return np.asarray(case.axis.linear(POSITION_M).sampled(RATE_HZ).response(f))
+        velocity = np.asarray(case.axis.linear(POSITION_M).sampled(RATE_HZ).response(f))
+        return velocity * (RATE_HZ * (1 - 1 / case.lines.z)) ** DERIVATIVE[case.output]
     return two_mass_loop.TwoMassPlant(bs=case.damping).response(f)
 
 
@@ -160,9 +182,13 @@ def recorded(case: Case, seed: int) -> Block:
         return _of_loop(case, period, seed)
     seconds = (LEAD + PERIODS) * period.size / RATE_HZ
     block, _ = SimulatedAxis(replace(case.axis, excitation_n_m=period, seconds=seconds, run_in_s=8.0, seed=seed)).run()
-    block = block.cut(LEAD * period.size, len(block))
-    names = {"w": "w", "u": "u", "velocity": "y"}
-    return Block(block.data[[block.index(name) for name in names]], tuple(names.values()), RATE_HZ)
+    y = block["velocity"]
+    if DERIVATIVE[case.output] < 0:
+        y = np.cumsum(y) / RATE_HZ
+    elif DERIVATIVE[case.output] > 0:
+        y = np.diff(y, prepend=y[0]) * RATE_HZ
+    channels = Channel("w"), Channel("u"), Channel("y", kind=case.output)
+    return Block(np.array([block["w"], block["u"], y])[:, LEAD * period.size :], channels, RATE_HZ)
 
 
 def _of_loop(case: Case, period: Floats, seed: int) -> Block:
@@ -190,7 +216,8 @@ def main(names: list[str]) -> int:
         shares = ", ".join(f"{way} {c[0]:.0%}/{c[1]:.0%}" for way, c in found.coverage.items())
         reasons = "; ".join(f"{k}: {', '.join(f'{f:g}' for f in v)} Hz" for k, v in found.reasons.items())
         verdict = "met" if found.met else "missed"
-        print(f"{verdict:6} {case.name}: {shares}; {found.valid:.0%} valid{f' ({reasons})' if reasons else ''}")
+        valid = f"{found.valid:.0%} valid{f' ({reasons})' if reasons else ''}"
+        print(f"{verdict:6} {case.name}: {shares}; width {found.width:.1f}; {valid}")
     return int(missed > 0)
 
 

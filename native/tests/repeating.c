@@ -51,7 +51,7 @@ static const int64_t tone[1] = {2}, beside_tone[2] = {1, 4}, lines_at[LINES] = {
                      beside_lines[6] = {1, 2, 1, 2, 1, 3};
 static const uint8_t yes[24] = {1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1};
 static const uint8_t multiples[LB_MAINS * LINES] = {1, 0, 1, 0, 0, 0};
-static const double two[LINES] = {2, 2, 2}, times[LINES] = {3, 4, 3}, difference[LINES] = {0.7, 1.2, 1.8};
+static const double two[LINES] = {2, 2, 2}, times[LINES] = {3, 4, 3}, of_step[LINES] = {0.7, 1.2, 1.8};
 static const int64_t left[BESIDE] = {0, 1, 2, 2}, right[BESIDE] = {0, 2, 2, 2};
 static const double share[BESIDE] = {0, 0.5, 0, 0}, position[LINES] = {0.25, 0.5, 0.75};
 static const int64_t beside[2 * LINES * LB_BESIDE] = {0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 0, 0,
@@ -64,8 +64,7 @@ static lb_repeating_plan plan_of(int instrument)
     const lb_tones excited = {LINES, 2, lines_at, beside_lines, yes, two, yes, times};
     const lb_mains mains = {MAINS_BINS, mains_bins, multiples, {free_tone, none}, excited};
     const lb_distortion distortion = {BESIDE, left, right, share, beside, yes, position};
-    const lb_repeating_plan plan = {WINDOW,     LINES, 3,          {0, 1, 2}, bins,      NULL,
-                                    instrument, 2,     difference, mains,     distortion};
+    const lb_repeating_plan plan = {WINDOW, LINES, 3, {0, 1, 2}, bins, NULL, instrument, 2, of_step, mains, distortion};
     return plan;
 }
 
@@ -171,7 +170,6 @@ static lb_periods periods_of(const double *spectra, const uint8_t *usable, const
                            moves,
                            before->out.distortion + row * LINES,
                            before->out.against + row * LB_VERDICT_KINDS * LINES,
-                           1,
                            scratch,
                            {step, step_of, by_chance}};
     return in;

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from livebode.core import Lines
+from livebode.core import Lines, QuantityKind
 from livebode.estimation.verdicts import Judge, by_chance
 from livebode.kernel import (
     ADDED,
@@ -50,7 +50,7 @@ class Case:
     instrument: bool
     hann: bool
     differenced: bool
-    is_velocity: bool
+    output: QuantityKind
     noise: float
     distortion: float
     hum: float
@@ -63,7 +63,7 @@ class Case:
 
     def judge(self) -> Judge:
         flags, ticks = np.array([self.differenced, False, False]), np.array([0, 2 * self.differenced, 0])
-        return Judge(LINES[self.lines], self.signals, self.instrument, self.hann, flags, ticks)
+        return Judge(LINES[self.lines], self.signals, self.instrument, self.hann, flags, ticks, self.output)
 
 
 cases = st.builds(
@@ -73,7 +73,7 @@ cases = st.builds(
     instrument=st.booleans(),
     hann=st.sampled_from([False, False, False, True]),
     differenced=st.booleans(),
-    is_velocity=st.booleans(),
+    output=st.sampled_from(["velocity", "position", "acceleration", "other"]),
     noise=st.sampled_from([1e-6, 0.01, 0.5]),
     distortion=st.sampled_from([0.0, 0.1, 2.0]),
     hum=st.sampled_from([0.0, 3.0]),
@@ -137,7 +137,6 @@ def periods_of(case: Case, judge: Judge) -> PeriodSpectra:
         rng.random(count) < case.moving,
         np.full(judge.lines, np.nan),
         np.zeros((REASONS, judge.lines), np.bool_),
-        case.is_velocity,
         lambda period: float(steps[period]),
         by_chance,
     )
@@ -203,7 +202,7 @@ def test_verdicts_and_state_have_the_bits_of_the_twin_however_the_periods_are_di
 def test_the_cases_contain_everything_that_can_happen():
     news, happened, against = set(), set(), np.zeros(REASONS, np.bool_)
     for distortion in (0.0, 2.0):
-        about = True, False, False, True, 0.01, distortion, 3.0, 0.5, 0.0, 0.02, 0.02
+        about = True, False, False, "velocity", 0.01, distortion, 3.0, 0.5, 0.0, 0.02, 0.02
         case = Case("odd, at the mains", (0, 1, 2), *about, (600,), 1)
         found, _ = judged_in_pieces(case, case.judge(), periods_of(case, case.judge()))
         news, happened = news | set(found.news.ravel().tolist()), happened | set(found.happened.tolist())
@@ -214,7 +213,7 @@ def test_the_cases_contain_everything_that_can_happen():
 
 
 def test_an_error_in_what_is_rarely_needed_is_raised():
-    case = Case("odd", (0, 1, 2), True, False, False, True, 0.01, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, (3,), 1)
+    case = Case("odd", (0, 1, 2), True, False, False, "velocity", 0.01, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, (3,), 1)
     judge = case.judge()
 
     def failing(_: int) -> float:
@@ -246,7 +245,7 @@ def settings_of(judge: Judge) -> RepeatingSettings:
     ],
 )
 def test_places_outside_of_the_arrays_are_refused(wrong):
-    made = settings_of(Case("odd", (0, 1, 2), True, False, False, True, 0, 0, 0, 0, 0, 0, 0, (3,), 1).judge())
+    made = settings_of(Case("odd", (0, 1, 2), True, False, False, "velocity", 0, 0, 0, 0, 0, 0, 0, (3,), 1).judge())
     assert (len(made.bins), len(made.left)) == (25, 14), "the sizes above"
     RepeatingPlan(made)
     with pytest.raises(ValueError, match=r"array|refused"):
@@ -266,7 +265,7 @@ def test_places_outside_of_the_arrays_are_refused(wrong):
     ],
 )
 def test_periods_of_another_shape_or_type_are_refused_and_nothing_changes(wrong):
-    case = Case("odd", (0, 1, 2), True, False, False, True, 0.01, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, (2,), 1)
+    case = Case("odd", (0, 1, 2), True, False, False, "velocity", 0.01, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, (2,), 1)
     judge = case.judge()
     state, plan = empty_state(judge), RepeatingPlan(settings_of(judge))
     with pytest.raises(ValueError, match=r"array|refused"):

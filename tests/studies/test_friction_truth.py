@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,8 @@ from numpy.typing import NDArray
 
 from livebode.core import Block, Channel, SignalError, UsageError
 from livebode.motion import FrictionCurve, friction_curve
+from livebode_control.strokes.friction import FrictionReport, friction_of
+from livebode_control.strokes.motion_samples import MotionSamples
 from studies.friction import CASES, STRIBECK, measured, truth
 from tests.support.command import livebode
 from tests.support.real_recordings import recording
@@ -130,3 +133,42 @@ def test_a_part_of_the_recording_is_what_another_program_cuts_from_it(tmp_path: 
     refused = livebode("friction", tmp_path / "a.csv", "--input", "F", "--position", "x", "--to", "3 periods")
     assert refused.code == 2
     assert "no periods" in refused.err
+
+
+def _written(block: Block, path: Path) -> Path:
+    table = np.column_stack([np.arange(len(block)) / RATE_HZ, block["F"], block["x"]])
+    np.savetxt(path, table, delimiter=",", header="time,F,x", comments="", fmt="%.17g")
+    return path
+
+
+@pytest.mark.parametrize("given", ["-F", "0.5*F - 1.5*F"])
+def test_a_negative_friction_is_refused_with_the_input_that_gives_the_positive_one(given: str, tmp_path: Path) -> None:
+    log = _written(_block(0), tmp_path / "log.csv")
+    refused = livebode("friction", log, "--input", given, "--position", "x", "--json")
+    assert refused.code == 2
+    error = json.loads(refused.err)["error"]
+    assert error["code"] == "signal.friction-negative"
+    assert error["facts"]["coulomb"] < -15
+    option, value = shlex.split(error["remedy"].removeprefix("give ").partition(", or ")[0])
+    found = json.loads(livebode("friction", log, option, value, "--position", "x", "--json").out)
+    assert abs(found["parameters"]["coulomb"]["value"] - COULOMB) <= 1.5 * found["parameters"]["coulomb"]["bound"]
+    assert found["notes"] == []
+
+
+def test_a_friction_that_noise_hides_is_reported_as_not_shown() -> None:
+    """No friction under noise of 50 N: of 12 runs, at most 2 are refused as negative (1 % expected)."""
+    refused = 0
+    for seed in range(12):
+        rng, v = np.random.default_rng([seed, 1]), _speed()
+        block = Block([50 * rng.standard_normal(v.size), _block(0)["x"]], _block(0).channels, RATE_HZ)
+        try:
+            report = _report(block)
+        except SignalError:
+            refused += 1
+            continue
+        assert all(f"the {name} is " in " ".join(report.notes) for name in ("inertia", "coulomb", "viscous"))
+    assert refused <= 2
+
+
+def _report(block: Block) -> FrictionReport:
+    return friction_of(MotionSamples(block, "F", "x", "position", len(block), None, {}, None))

@@ -132,7 +132,7 @@ class _Twin:
     def _judged(self, period: int, moments: Moments) -> None:
         judge, pair = self._judge, moments.pair
         numerator = pair[0, :, self._lines]
-        steps = self.step * (judge.difference if self._in.is_velocity else np.ones(judge.lines))
+        steps = self.step * judge.of_step
         of_steps = judge.window * steps**2 / 12
         distortion, against = self._distortion(period, moments, pair, of_steps)
         counts = 2 * magnitude(numerator[0]) / judge.window / steps

@@ -58,12 +58,12 @@ typedef struct {
 
 typedef struct {
     size_t window, lines, signals;
-    size_t of_signal[3];      /* output, denominator, reference, among the signals */
-    const int64_t *bin;       /* [lines + distortion.bins] of the DFT */
-    const double *after;      /* [3][lines + distortion.bins][2], factors of the spectra; NULL without */
-    int instrument;           /* the reference is the excitation itself */
-    size_t judged_every;      /* periods */
-    const double *difference; /* [lines], |1 − z⁻¹| */
+    size_t of_signal[3];   /* output, denominator, reference, among the signals */
+    const int64_t *bin;    /* [lines + distortion.bins] of the DFT */
+    const double *after;   /* [3][lines + distortion.bins][2], factors of the spectra; NULL without */
+    int instrument;        /* the reference is the excitation itself */
+    size_t judged_every;   /* periods */
+    const double *of_step; /* [lines], what a step of the sensor is at a line */
     lb_mains mains;
     lb_distortion distortion;
 } lb_repeating_plan;
@@ -96,7 +96,6 @@ typedef struct {
     const uint8_t *moves;     /* [count], the machine moves */
     const double *distortion; /* [lines], verdict before them */
     const uint8_t *against;   /* [LB_VERDICT_KINDS][lines] */
-    int is_velocity;          /* the output: its steps are those of the position that it was differenced from */
     double *scratch;          /* lb_repeating_scratch numbers */
     lb_repeating_rare rare;
 } lb_periods;

@@ -214,8 +214,7 @@ static lb_verdict_facts facts_of(const job *j, const double *pair)
                                 .pair = pair,
                                 .weights = w,
                                 .unbiased = rest > several ? rest : lb_not_a_number(),
-                                .of_mean = w.two / (w.one * w.one),
-                                .is_velocity = j->in->is_velocity};
+                                .of_mean = w.two / (w.one * w.one)};
     return f;
 }
 
@@ -374,7 +373,7 @@ static int is_missing(const lb_repeating_plan *plan, const lb_repeating_state *s
     const int after = out->distortion && out->against && out->invalid;
     const int of_periods =
         in->spectra && in->usable && in->moves && out->happened && out->news && out->pair && out->steps;
-    return !(plan->bin && plan->difference && state && before && after && (of_periods || !in->count));
+    return !(plan->bin && plan->of_step && state && before && after && (of_periods || !in->count));
 }
 
 static int has_too_many_neighbours(const lb_mains *mains)

@@ -26,7 +26,6 @@ typedef struct {
     lb_weight_sums weights; /* of the periods */
     double unbiased;        /* a scatter over this is the variance of one period */
     double of_mean;         /* variance of the mean over that */
-    int is_velocity;
 } lb_verdict_facts;
 
 typedef struct {
@@ -69,7 +68,7 @@ static inline double lb_power(const double *x) { return x[0] * x[0] + x[1] * x[1
 /* The step of the output's sensor as it may move a line. */
 static inline double lb_step_at(const lb_verdict_facts *f, size_t line)
 {
-    return f->state->step * (f->is_velocity ? f->plan->difference[line] : 1.0);
+    return f->state->step * f->plan->of_step[line];
 }
 
 /* Variance of uniform rounding to such steps, in a line's spectrum. */

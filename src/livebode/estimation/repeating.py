@@ -77,7 +77,7 @@ class RepeatingErrors(PeriodCutter):
     def __init__(self, settings: Settings, events: list[Event] | None = None) -> None:
         lines = settings.lines
         super().__init__(lines.window, np.array(settings.differenced_roles))
-        self._settings, self._judge = settings, judge_of(settings)
+        self._settings, self._judge = settings, judge_of(settings, None)
         self._largest, self._step = 0.0, 0.0
         self._looked = slice(0, None, -(-lines.window // PLACES))
         self._movement = Movement(self._position[self._looked].size)
@@ -113,7 +113,7 @@ class RepeatingErrors(PeriodCutter):
         told = self._told.copy()
         told[HUM] |= self._known_hum()
         reasons = {kind: f[told[i]].tolist() for i, kind in enumerate(KINDS) if told[i].any()}
-        newest = [None if np.isnan(d) else float(d) for d in self._now.distortion]
+        newest = [None if np.isnan(d) else float(d) for d in self._now.distortion * self._judge.to_output]
         return {
             "distortion": None if self._judge.distortion is None else newest,
             "invalid_lines_hz": reasons,
@@ -169,6 +169,7 @@ class RepeatingErrors(PeriodCutter):
         cut = self._cut(data, schedule, np.concatenate(left_out) if left_out else aside)
         which = (rows.sample - block.start + self._at) // self._window  # so many periods end before
         kind = next((c.stated_kind for c in block.channels if c.name == self._settings.output), None)
+        self._judge = judge_of(self._settings, kind)
         begun, verdicts = self._now, [self._verdicts(periods, block, kind) for periods in cut]
         if not verdicts:
             now = begun.distortion[np.newaxis], np.logical_or.reduce(begun.against, axis=0, keepdims=True)
@@ -178,8 +179,9 @@ class RepeatingErrors(PeriodCutter):
             now = _joined([part.distortion for part in verdicts]), _joined([part.invalid for part in verdicts])
         hum = self._hum_of_windows(data, rows.sample, block, aside)
         if hum is None or not hum.any():
-            return RepeatingVerdicts(*now, which, self._dof)
-        return RepeatingVerdicts(now[0][which], now[1][which] | hum, np.arange(which.size), self._dof)
+            return RepeatingVerdicts(now[0] * self._judge.to_output, now[1], which, self._dof)
+        distortion = now[0][which] * self._judge.to_output
+        return RepeatingVerdicts(distortion, now[1][which] | hum, np.arange(which.size), self._dof)
 
     def _hum_of_windows(
         self, data: Floats, sample: NDArray[np.int64], block: Block, aside: NDArray[np.intp]
@@ -222,7 +224,6 @@ class RepeatingErrors(PeriodCutter):
             self._moves(periods),
             self._now.distortion,
             self._now.against,
-            kind in ("velocity", None),
             lambda period: step_of(periods.signals[0, period]),
             by_chance,
         )
@@ -262,7 +263,7 @@ class RepeatingErrors(PeriodCutter):
                     gone = bool(verdicts.news[period, i, line] == NEWS_GONE)
                     self._events.append(hum_event(self._settings.lines, int(line), sample, time_s, gone=gone))
                 continue
-            message, value = reason(verdicts, period, int(i), int(line), f, output)
+            message, value = reason(verdicts, period, int(i), int(line), f, output, self._judge.to_output)
             message, details = (
                 Message("{verdict}; the line is not valid", verdict=message),
                 {"line_hz": float(f)} | value,

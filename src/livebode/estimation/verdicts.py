@@ -39,8 +39,11 @@ A nonlinearity changes the gain at the lines (the describing function) and sprea
 reaches. Of a sign of Gaussian velocity the gain has 2/π of the power, and the rest is spread over a band twice as wide:
 about 2 for a flat velocity (`python -m studies.repeating`). By Bussgang's theorem (1952) the change is proportional to
 the line's own amplitude in the signal that is distorted, and the rest is not: a line that is stronger in the output
-than the rms of the lines, as at a resonance, changes more in the same proportion.
+than the rms of the lines, as at a resonance, changes more in the same proportion. Friction acts on the velocity, so a
+position or an acceleration is judged as a velocity.
 """
+_TO_VELOCITY: dict[QuantityKind | None, int] = {"position": 1, "acceleration": -1}
+"""Differences from an output to a velocity; outputs of other kinds are judged as they are."""
 _STEPS_MARGIN = 3.0  # ratio to uniform rounding that the steps of a sensor may have at a few bins
 _POWERLESS = 1e-4
 _SMOOTH = 5  # detection lines over which the noise is averaged before it is compared with
@@ -213,7 +216,13 @@ class Verdict:
 
 
 def reason(
-    verdicts: PeriodVerdicts, period: int, kind: int, line: int, f: float, output: QuantityKind | None
+    verdicts: PeriodVerdicts,
+    period: int,
+    kind: int,
+    line: int,
+    f: float,
+    output: QuantityKind | None,
+    to_output: Floats,
 ) -> Reason:
     """Why the line with this number and frequency is invalid since a period: for a message, and its details."""
     if KINDS[kind] == "steps":
@@ -226,15 +235,20 @@ def reason(
         if output == "other":
             message = Message("{few}; if the output is a velocity, declare it in source.kinds", few=message)
         return message, {"steps": counts}
-    numerator, denominator = verdicts.pair[period, :, line]
-    share = float(verdicts.distortion[period + 1, line] / np.abs(numerator / denominator))
+    judged, denominators = verdicts.pair[period]
+    share = float(verdicts.distortion[period + 1, line] / np.abs(judged[line] / denominators[line]))
+    outputs = np.abs(judged) * to_output
+    level_db = float(20 * np.log10(share * outputs[line] / np.sqrt(np.mean(outputs**2))))
     message = Message(
-        "distortion may be {percent:.0f}% of the response at {line_hz:g} Hz (friction, backlash or sensor steps; "
-        "increase the excitation, or move the axis)",
+        "distortion may be {percent:.0f}% of the response at {line_hz:g} Hz, {level_db:.1f} dB relative to the output "
+        "at a line (friction, backlash or sensor steps; increase the excitation, or move the axis)",
         percent=100 * share,
         line_hz=f,
+        level_db=level_db,
     )
-    return message, {"share": share}
+    if output in (None, "other"):
+        message = Message("{few}; if the output is a position, declare it in source.kinds", few=message)
+    return message, {"share": share, "level_db": level_db}
 
 
 class Judge:
@@ -246,10 +260,13 @@ class Judge:
         The lines, and the bins beside them at which distortion is seen.
     signals
         Output, denominator and reference among the signals.
-    difference
-        |1 − z⁻¹| at the lines.
+    of_step
+        What a step of the output's sensor is at the lines; the steps of a velocity are those of its position.
+    to_output
+        Amplitude of the output over that of the signal that is judged, which is the velocity where it is known.
     after
-        Factors of the spectra of `signals` at `bins`, shape (3, bins); None where all are 1.
+        Factors of the spectra of `signals` at `bins`, shape (3, bins); None where all are 1. A position or an
+        acceleration becomes a velocity.
     judged_every
         Periods from one verdict to the next.
     """
@@ -262,16 +279,21 @@ class Judge:
         hann: bool,
         differenced: Flags,
         advanced: NDArray[np.int64],
+        output: QuantityKind | None,
     ) -> None:
         self.mains = mains_of(lines)
         self.distortion = Distortion(lines) if reached(lines).size > 0 and not hann else None
         beside = self.distortion.bins if self.distortion else np.zeros(0, dtype=np.int64)
         self.bins = np.concatenate([np.asarray(lines.bins), beside])
         self.window, self.lines, self.signals, self.instrument = lines.window, len(lines), signals, instrument
-        self.difference = np.abs(1 - 1 / lines.z)
         self.after = None
-        if differenced.any() or advanced.any():
+        differences = _TO_VELOCITY.get(output, 0)
+        if differenced.any() or advanced.any() or differences:
             self.after = np.ascontiguousarray(after(self.bins, lines.window, differenced, advanced)[list(signals)])
+            self.after[0] *= (1 - np.exp(-2j * np.pi * self.bins / lines.window)) ** differences
+        difference = np.abs(1 - 1 / lines.z)
+        self.to_output = difference**-differences
+        self.of_step = difference if output in ("velocity", "position", None) else 1 / self.to_output
         self.judged_every = max(1, round(lines.rate_hz / lines.window / _JUDGED_PER_S))
         self._plan = self._plan_of(len(differenced))
 
@@ -292,7 +314,7 @@ class Judge:
                 self.bins,
                 self.after,
                 self.instrument,
-                self.difference,
+                self.of_step,
                 self.judged_every,
                 mains.bins,
                 mains.lines,
@@ -312,14 +334,15 @@ def _tones(beside: Neighbours) -> Tones:
     return Tones(beside.tones, beside.beside, beside.usable, beside.known, beside.enough, beside.times)
 
 
-def judge_of(settings: Settings) -> Judge:
-    """The Judge for these settings; several trackers of the same lines have the same one."""
+def judge_of(settings: Settings, kind: QuantityKind | None) -> Judge:
+    """The Judge for these settings and an output of this kind; several trackers of the same lines have the same one."""
     method = settings.method
     names: tuple[Role, Role, Role] = "output", method.denominator, method.reference
     output, denominator, reference = map(settings.roles.index, names)
     instrument = method.reference == "excitation"
     differenced, advanced = settings.differenced_roles, settings.advanced_ticks
-    return _judge(settings.lines, (output, denominator, reference), instrument, settings.hann, differenced, advanced)
+    signals = output, denominator, reference
+    return _judge(settings.lines, signals, instrument, settings.hann, differenced, advanced, kind)
 
 
 @lru_cache(maxsize=64)
@@ -330,5 +353,6 @@ def _judge(
     hann: bool,
     differenced: tuple[bool, ...],
     advanced: tuple[int, ...],
+    output: QuantityKind | None,
 ) -> Judge:
-    return Judge(lines, signals, instrument, hann, np.array(differenced), np.array(advanced))
+    return Judge(lines, signals, instrument, hann, np.array(differenced), np.array(advanced), output)

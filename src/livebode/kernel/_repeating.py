@@ -54,8 +54,8 @@ class RepeatingSettings(NamedTuple):
         Factors of the spectra of `of_signal`, shape (3, bins); None without.
     instrument
         Whether the reference is the excitation itself.
-    difference
-        |1 − z⁻¹|, shape (lines,).
+    of_step
+        What a step of the output's sensor is at a line, shape (lines,).
     judged_every
         Periods from one verdict to the next.
     mains_bins
@@ -77,7 +77,7 @@ class RepeatingSettings(NamedTuple):
     bins: Integers
     after: Complex | None
     instrument: bool
-    difference: Floats
+    of_step: Floats
     judged_every: int
     mains_bins: Integers
     multiples: Flags
@@ -132,8 +132,6 @@ class PeriodSpectra(NamedTuple):
         Without a missing sample; and in which the machine moves, shape (periods,).
     distortion, against
         The verdict before them, shapes (lines,) and (reasons, lines).
-    is_velocity
-        Whether the output's steps are those of the position that it was differenced from.
     step_of
         Step of the output in the period with this number.
     by_chance
@@ -146,7 +144,6 @@ class PeriodSpectra(NamedTuple):
     moves: Flags
     distortion: Floats
     against: Flags
-    is_velocity: bool
     step_of: Callable[[int], float]
     by_chance: Callable[[int, float], float]
 

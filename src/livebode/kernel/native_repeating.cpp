@@ -32,7 +32,7 @@ class Plan {
         plan_.bin = places(of[3], {bins}, spectrum);
         if (!of[4].is_none()) plan_.after = hold(of[4], COMPLEX, {3, bins}).data<double>();
         plan_.instrument = nb::cast<bool>(of[5]);
-        plan_.difference = hold(of[6], REAL, {lines});
+        plan_.of_step = hold(of[6], REAL, {lines});
         plan_.judged_every = nb::cast<size_t>(of[7]);
         lb_mains &mains = plan_.mains;
         mains.bins = length_of(of[8], 0);
@@ -144,7 +144,7 @@ nb::tuple judge_periods(const Plan &of, nb::tuple state, nb::tuple periods, nb::
     const Array every(spectra, COMPLEX, {plan.signals, count, plan.window / 2 + 1});
     const Array usable(periods[1], FLAG, {count}), moves(periods[2], FLAG, {count});
     const Array before(periods[3], REAL, {lines}), against(periods[4], FLAG, {kinds, lines});
-    Rare rare{periods[6], periods[7], nullptr};
+    Rare rare{periods[5], periods[6], nullptr};
     const std::unique_ptr<double[]> scratch(new double[lb_repeating_scratch(&plan)]);
     const lb_periods in = {count,
                            every.data<double>(),
@@ -152,7 +152,6 @@ nb::tuple judge_periods(const Plan &of, nb::tuple state, nb::tuple periods, nb::
                            moves,
                            before,
                            against,
-                           nb::cast<bool>(periods[5]),
                            scratch.get(),
                            {&rare, Rare::step, Rare::chance}};
 

@@ -33,6 +33,7 @@ class SignalError(LivebodeError):
         "channel-empty": "A channel has no finite sample.",
         "channel-unknown": "There is no channel of this name.",
         "empty": "There are no samples.",
+        "friction-negative": "The friction that the samples show is negative: the input has the wrong sign.",
         "layout-differs": "The spectra that the drive sends do not fit the settings of the tracker.",
         "line-not-excited": "The excitation has no power at a line.",
         "lines-ambiguous": "More than one set of lines explains the excitation equally well.",

@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+import shlex
 from typing import Any
 
+import numpy as np
+
 from livebode.arrays import Floats
-from livebode.core import COVERAGE
+from livebode.core import COVERAGE, SignalError
 from livebode.dataclass import dataclass
 from livebode.motion import FrictionCurve, friction_curve
+from livebode.sources import negated
 from livebode_control.strokes.motion_samples import MotionSamples
+
+_SURE = 0.99
+"""Probability with which a friction is negative, or differs between the directions."""
+_USELESS = 0.5  # of a value: a bound above it, and the recording does not show the value
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +48,22 @@ class FrictionReport:
     def differing(self) -> bool:
         """Whether the viscous friction of the directions differs, by more than its bound of 99 %."""
         index = self.directions.index("asymmetry")
-        return bool(abs(self.directions.value[index]) > self.directions.bound(0.99)[index])
+        return bool(abs(self.directions.value[index]) > self.directions.bound(_SURE)[index])
+
+    @property
+    def notes(self) -> list[str]:
+        """What is negative and cannot be, and what the recording does not show, as sentences."""
+        found = []
+        for name, remedy in _REMEDIES.items():
+            value, bound = _of(self.curve, name, COVERAGE)
+            shown = f"the {name} is {_text(value, bound)}"
+            if value < 0:
+                found.append(
+                    f"{shown}: it is negative, which is not possible, so the recording does not show it; {remedy}"
+                )
+            elif bound > _USELESS * value:
+                found.append(f"{shown}: the recording hardly shows it; {remedy}")
+        return found
 
     def plain(self) -> dict[str, Any]:
         """Plain data for JSON."""
@@ -52,6 +75,7 @@ class FrictionReport:
             **self.curve.plain(),
             "directions": each,
             "directions_differ": self.differing,
+            "notes": self.notes,
             "places": None if self.places is None else self.places.plain(),
             "input": self.strokes.input,
             "output": self.strokes.output,
@@ -64,7 +88,7 @@ class FrictionReport:
 def friction_of(
     strokes: MotionSamples, *, places: int = 0, band_hz: float = 5.0, slowest: float | None = None
 ) -> FrictionReport:
-    """The friction in these samples; errors as of `friction_curve`."""
+    """The friction in these samples; errors as of `friction_curve`, and SignalError where it is negative."""
 
     def curve(directions: bool, places: int) -> FrictionCurve:
         return friction_curve(
@@ -78,4 +102,43 @@ def friction_of(
             slowest=slowest,
         )
 
-    return FrictionReport(curve(False, 0), curve(True, 0), curve(False, places) if places else None, strokes)
+    both = curve(False, 0)
+    _check_sign(both, strokes.input)
+    return FrictionReport(both, curve(True, 0), curve(False, places) if places else None, strokes)
+
+
+_REMEDIES = {
+    "inertia": "record strokes with more acceleration",
+    "coulomb": "record more strokes at several speeds, and check the sign of the input",
+    "viscous": "record strokes at several speeds, farther apart",
+}
+
+
+def _check_sign(curve: FrictionCurve, name: str) -> None:
+    """SignalError where the friction is negative at one end of the speeds, and not positive at the other."""
+    value, bound = curve.at(np.array(curve.speed), _SURE)
+    if not (np.any(value < -bound) and not np.any(value > bound)):
+        return
+    coulomb, viscous = (_text(*_of(curve, part, COVERAGE)) for part in ("coulomb", "viscous"))
+    other = negated(name)
+    quoted = f"'{other}'" if "'" not in other else shlex.quote(other)
+    raise SignalError(
+        "friction-negative",
+        f"the friction is negative: Coulomb {coulomb}, viscous {viscous}; the input {name!r} has the other sign, or is "
+        "not what moves the axis",
+        f"give --input {quoted}, or name the channel of the torque",
+        argument="input",
+        value=name,
+        coulomb=curve["coulomb"],
+        viscous=curve["viscous"],
+    )
+
+
+def _of(curve: FrictionCurve, name: str, probability: float) -> tuple[float, float]:
+    """Value and bound of a parameter."""
+    index = curve.index(name)
+    return float(curve.value[index]), float(curve.bound(probability)[index])
+
+
+def _text(value: float, bound: float) -> str:
+    return f"{value:.4g} ± {bound:.2g}"

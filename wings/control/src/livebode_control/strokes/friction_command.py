@@ -121,6 +121,8 @@ def show_friction(report: FrictionReport) -> None:
         screen.print("no Stribeck friction is visible (99.9 %)")
     if report.differing:
         screen.print("the viscous friction differs between the directions (99 %); 'both' is its mean", soft_wrap=True)
+    for note in report.notes:
+        screen.print(note, soft_wrap=True)
     if report.places is not None:
         _show_places(report)
 
