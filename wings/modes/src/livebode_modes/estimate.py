@@ -68,7 +68,8 @@ class _Track:
     def distance(self, mode: Mode) -> float:
         """Distance of a mode of the next window, 1 at the limit; infinite for a different shape."""
         sigma = np.sqrt(self.last.covariance[0, 0] + mode.covariance[0, 0])
-        reach = _NEAR * self.last.frequency_hz * min(1 + self.missed, _GAP_FACTOR_MAX)
+        near = max(_NEAR, 2 * self.last.damping)
+        reach = near * self.last.frequency_hz * min(1 + self.missed, _GAP_FACTOR_MAX)
         if mac(self.last.shape, mode.shape) < _MAC_MIN:
             return np.inf
         return float(abs(mode.frequency_hz - self.last.frequency_hz) / max(reach, _SIGMAS * sigma))

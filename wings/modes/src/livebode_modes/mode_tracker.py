@@ -13,8 +13,9 @@ from livebode.dataclass import dataclass
 from livebode.language import Message
 from livebode_modes.correlations import hop_correlations
 from livebode_modes.output_only_settings import HOPS_MIN, OutputOnlySettings
-from livebode_modes.reduction import Reduction
-from livebode_modes.stabilisation import Mode, stable_modes
+from livebode_modes.reduction import PASSED, Reduction
+from livebode_modes.refinement import Refinement
+from livebode_modes.stabilisation import Mode, possible_modes, stable_modes
 from livebode_modes.subspace import Subspace
 
 SPREAD_MAX = 0.25
@@ -47,6 +48,14 @@ def is_harmonic(mode: Mode, y: Floats, rate_hz: float) -> bool:
     return bool(spread[int(np.argmax(power.mean(axis=0)))] <= SPREAD_MAX)
 
 
+def _is_new(mode: Mode, stable: list[Mode]) -> bool:
+    """Whether no stable pole is within half the half-power width of the mode."""
+    apart_hz = [abs(mode.frequency_hz - other.frequency_hz) for other in stable]
+    return all(hz > max(mode.damping, _SAME) * mode.frequency_hz for hz in apart_hz)
+
+
+_FURTHER_ORDERS = 4  # above the sufficient one, for modes that it does not separate
+_SAME = 0.01
 _PLAUSIBLE_MAX = 1e100  # products of larger samples overflow
 
 
@@ -140,6 +149,8 @@ class ModeTracker:
         self._reduced = np.zeros((len(of.outputs), 0))
         self._finite = np.zeros(0, dtype=np.bool_)
         self._schedule = np.zeros(0)
+        self._gain = self._reduction.squared_gain(np.fft.rfftfreq(of.hop_samples * of.hops))
+        self._passed_hz = of.highpass_hz, PASSED * of.reduced_rate_hz / 2
         self._hops: deque[tuple[Floats, Floats]] = deque(maxlen=of.hops)
         self._first, self._hop_number, self._dropped = first, 0, 0
 
@@ -198,6 +209,11 @@ class ModeTracker:
         order, stable = stable_modes(subspace, of.band_hz)
         for mode in stable:
             (harmonics if is_harmonic(mode, samples, of.reduced_rate_hz) else modes).append(mode)
+        every = np.array([y for _, y in self._hops]), np.array([bool(r.size) for r, _ in self._hops])
+        lines_hz = [mode.frequency_hz for mode in harmonics]
+        refinement = Refinement(of.reduced_rate_hz, self._passed_hz, self._gain, *every, lines_hz)
+        others = possible_modes(subspace, order + _FURTHER_ORDERS, of.band_hz) if stable else []
+        modes = refinement.modes(modes, [mode for mode in others if _is_new(mode, stable)])
         return WindowModes(newest, time_s, schedule, tuple(modes), tuple(harmonics), order=order)
 
     def _schedule_at(self, centre: int) -> float:

@@ -13,7 +13,8 @@ with needing("SciPy", "analysis", "a run from the outputs alone"):
 
 
 _HALF_TAPS = 10  # of the low-pass on either side, in samples at the reduced rate
-_PASSED = 0.8  # of half the reduced rate
+PASSED = 0.8
+"""Share of half the reduced rate that the low-pass passes."""
 
 
 def lost_samples(factor: int) -> int:
@@ -41,7 +42,7 @@ class Reduction:
 
     def __init__(self, factor: int, highpass: float) -> None:
         self._factor = factor
-        self._taps = scipy.signal.firwin(lost_samples(factor) + 1, _PASSED / factor) if factor > 1 else np.ones(1)
+        self._taps = scipy.signal.firwin(lost_samples(factor) + 1, PASSED / factor) if factor > 1 else np.ones(1)
         self._sections = np.repeat(scipy.signal.butter(1, 2 * highpass, "highpass", output="sos"), 2, axis=0)
         self._waiting: Floats | None = None
         self._state: Floats | None = None
@@ -51,6 +52,13 @@ class Reduction:
     def lead(self) -> int:
         """Samples before the first reduced one, whose centre it is."""
         return (len(self._taps) - 1) // 2
+
+    def squared_gain(self, frequency: NDArray[np.floating]) -> Floats:
+        """Squared gain of both filters at frequencies that are shares of the reduced rate."""
+        omega = 2 * np.pi * frequency
+        high = scipy.signal.sosfreqz(self._sections, omega)[1]
+        low = scipy.signal.freqz(self._taps, 1, omega / self._factor)[1]
+        return np.asarray(np.abs(high * low) ** 2)
 
     def process(self, x: Floats) -> tuple[Floats, NDArray[np.bool_]]:
         """The reduced samples, (channels, n), and which of them are from finite samples only, (n,)."""

@@ -77,13 +77,22 @@ def stable_modes(subspace: Subspace, band_hz: tuple[float, float]) -> tuple[int,
     return order, [_mode(poles, i) for i in _separate(poles, stable)]
 
 
+def possible_modes(subspace: Subspace, order: int, band_hz: tuple[float, float]) -> list[Mode]:
+    """Poles of a model that could be modes, whether or not models of other orders repeat them, strongest first."""
+    poles = subspace.poles(min(order, subspace.order_max - 1))
+    in_band = (band_hz[0] <= poles.frequency_hz) & (poles.frequency_hz <= band_hz[1])
+    use = np.flatnonzero(in_band & (poles.damping > 0) & (poles.damping <= DAMPING_MAX) & (poles.share >= SHARE_MIN))
+    return [_mode(poles, int(i)) for i in use[np.argsort(-poles.share[use])]]
+
+
 def _separate(poles: Poles, stable: list[int]) -> list[int]:
     """The strongest of poles whose bounds do not separate them in frequency: a model may split a mode in two."""
     kept: list[int] = []
     for i in sorted(stable, key=lambda i: -poles.share[i]):
         apart = np.abs(poles.frequency_hz[kept] - poles.frequency_hz[i])
         sigma = np.sqrt(poles.covariance[kept, 0, 0] + poles.covariance[i, 0, 0])
-        if np.all(apart > _SIGMAS * sigma):
+        width = poles.damping[kept] * poles.frequency_hz[kept] + poles.damping[i] * poles.frequency_hz[i]
+        if np.all(apart > np.maximum(_SIGMAS * sigma, width)):
             kept.append(i)
     return sorted(kept)
 
@@ -103,7 +112,7 @@ def _possible(poles: Poles, i: int, band_hz: tuple[float, float]) -> bool:
     sigma_f, sigma_z = np.sqrt(np.diagonal(poles.covariance[i]))
     in_band = band_hz[0] <= f <= band_hz[1] and poles.share[i] >= SHARE_MIN
     # A growing pole is possible within its bound: a line of constant amplitude has no damping.
-    return bool(in_band and -_SIGMAS * sigma_z <= z <= DAMPING_MAX and sigma_f <= UNCERTAINTY_MAX * f)
+    return bool(in_band and -_SIGMAS * sigma_z <= z <= DAMPING_MAX and sigma_f <= max(UNCERTAINTY_MAX, z) * f)
 
 
 def _repeats(model: Poles, poles: Poles, i: int) -> bool:
