@@ -249,7 +249,7 @@ def assembled(
 
 
 def _order(of: SeparatedFit, model: Kind) -> int:
-    return of.structure.pairs if model == "modal" else of.structure.poles
+    return of.structure.modes if model == "modal" else of.structure.poles
 
 
 def check_model(model: str, order: int | None) -> None:

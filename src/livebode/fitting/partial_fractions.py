@@ -23,7 +23,8 @@ class Structure:
     The nonlinear parameters are a1, a0 of each pair s² + a1·s + a0, a of a real pole s + a, and the delays. A pair may
     be complex or real, so that a search can pass from one to the other. The linear ones, for each output, are two for a
     pair, b1·s + b0, one for a real pole and for each of the integrators 1/s and 1/s², and the direct terms: 1 and one
-    tick's delay of it behind a hold, else 1 and s. They are the effect of modes above the lines.
+    tick's delay of it behind a hold, else 1 and s. They are the effect of modes above the lines. The last pairs may be
+    `residual`: poles outside of the lines that are no modes, the effect of what the direct terms do not follow.
     """
 
     outputs: int
@@ -32,6 +33,12 @@ class Structure:
     integrators: int = 0
     direct: int = 0
     delays: bool = False
+    residual: int = 0
+
+    @property
+    def modes(self) -> int:
+        """Number of pairs that are not residual."""
+        return self.pairs - self.residual
 
     @property
     def nonlinear(self) -> int:
@@ -181,7 +188,7 @@ class PoleQuantities:
     ) -> None:
         self._structure, self._unit = structure, unit
         a1, a0 = structure.pairs_of(like[: structure.nonlinear]).T
-        order = np.argsort(np.abs(a0))
+        order = np.argsort(np.abs(a0[: structure.modes]))
         self._modes = [int(i) for i in order if a1[i] ** 2 < 4 * a0[i]]
         self._real = [int(i) for i in order if i not in self._modes]
         modes, reals = len(self._modes), 2 * len(self._real) + structure.single

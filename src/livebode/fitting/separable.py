@@ -20,9 +20,12 @@ _FIRST_EPSILON = 0.1
 _SAME = 0.01
 _TICK_STEP = 1e-4  # of a tick, for the slope by a delay
 _ERROR_PRICE = 0.15  # of a pole for each value whose error is the model's: a pair has to lower ε by 14 %
+_CHANCE = 3.0  # deviations of chi² by which an error of the model is told from chance
+_EVIDENCE = 5.0  # for each pole: 10 for a pair, which Kass and Raftery (1995) call very strong
 _LEFT_OVER = 4  # real values more than parameters
+_SINGULAR = 1e-6  # of the largest singular value of residual terms
 _TOLERANCE = 1e-8
-_EVALUATIONS = 40
+EVALUATIONS = 40
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,9 +63,11 @@ class SeparatedFit:
         Of the model, and by which the residuals were multiplied, (outputs, lines).
     epsilon
         Model error of each output as a share of its measured |G|, (outputs,).
+    misfit
+        −2·ln(likelihood).
     cost
-        −2·ln(likelihood) plus ln(values) for each parameter, the criterion of Bayes and Schwarz (BIC); and for each
-        pole ln(lines), and 0.15 for each value whose error is the model's, not noise.
+        The misfit plus ln(values) for each parameter, the criterion of Bayes and Schwarz (BIC); and for each
+        pole ln(lines) + 5, and 0.15 for each value whose error is the model's, not noise.
     settled
         Whether the search converged.
     """
@@ -73,39 +78,51 @@ class SeparatedFit:
     response: Complex
     weight: Floats
     epsilon: Floats
+    misfit: float
     cost: float
     settled: bool
 
 
 def solve(
-    outputs: Outputs, structure: Structure, start: Floats, *, rounds: int, evaluations: int = _EVALUATIONS
+    outputs: Outputs, structure: Structure, start: Floats, *, rounds: int, evaluations: int = EVALUATIONS
 ) -> SeparatedFit:
-    """Fit from a start, and again with the ε of the residuals, at most `rounds` times."""
+    """Fit from a start, and again with the ε of the residuals, at most `rounds` times; poles rest at 0 evaluations."""
     measured = outputs.measured
     epsilon = np.full(structure.outputs, _FIRST_EPSILON)
     theta, dof = start, _dof(outputs, structure)
+    # |residual|²/sigma² is on average n/(n − 1) where sigma has n complex degrees of freedom.
+    expected, spread = _student(outputs.noise_dof)
     for _ in range(rounds):
         problem = _WeightedFit(outputs, structure, _weights(measured, epsilon))
-        theta, settled = problem.minimised(theta, evaluations)
+        theta, settled = problem.minimised(theta, evaluations) if evaluations else (theta, False)
         linear, response = problem.at(theta)
         residual, noise, _ = squares(measured, response)
         size = np.where(measured.use, np.abs(measured.value), 0.0) ** 2
-        before, epsilon = epsilon, epsilon_for(residual, noise, size, dof)
+        before, epsilon = epsilon, epsilon_for(residual, noise * expected[:, np.newaxis], size, dof)
         if (np.abs(epsilon - before) <= _SAME * epsilon).all():
             break
     variance = noise + epsilon[:, np.newaxis] ** 2 * size
     likely = float(np.sum(misfit_by(residual, noise, variance, outputs.noise_dof, measured.use)))
     # Errors of an incomplete model are alike at neighbouring lines and in all outputs: they are fewer than lines.
-    erring = 2 * float(np.sum(1 - (noise / np.where(variance > 0, variance, 1.0))[measured.use]))
+    chance = 1 + _CHANCE * spread * np.sqrt(2 / dof)
+    sure = epsilon_for(residual, noise * (expected * chance)[:, np.newaxis], size, dof)
+    least = noise + sure[:, np.newaxis] ** 2 * size
+    erring = 2 * float(np.sum(1 - (noise / np.where(least > 0, least, 1.0))[measured.use]))
     each_pole = pole_price(outputs.grid.frequency_hz.size, erring)
     cost = likely + structure.size * np.log(outputs.count) + structure.poles * each_pole
-    return SeparatedFit(structure, theta, linear, response, problem.weight, epsilon, cost, settled)
+    return SeparatedFit(structure, theta, linear, response, problem.weight, epsilon, likely, cost, settled)
+
+
+def _student(dof: Floats) -> tuple[Floats, Floats]:
+    """Mean of |residual|²/sigma² and its relative deviation, where sigma² has these complex degrees of freedom."""
+    n = np.clip(dof, 3.0, 1e9)
+    return n / (n - 1), np.sqrt(n / (n - 2))
 
 
 def pole_price(lines: int, erring: float) -> float:
     """Cost of a pole beside its parameters; `erring` is the number of real values whose error is the model's."""
     # A pole is searched for over all lines, so the largest of as many random values is found.
-    return float(np.log(lines) + _ERROR_PRICE * erring)
+    return float(np.log(lines) + _EVIDENCE + _ERROR_PRICE * erring)
 
 
 def whole_covariance(outputs: Outputs, of: SeparatedFit) -> Floats:
@@ -121,10 +138,34 @@ def whole_covariance(outputs: Outputs, of: SeparatedFit) -> Floats:
     total = np.sqrt(sigma**2 + (epsilon[:, np.newaxis] * np.abs(measured.value)) ** 2)
     # As noise alone: what part of it is sigma, with few degrees of freedom, is in `noise_dof` of the whole.
     flat = MeasuredRows(measured.value.reshape(1, -1), total.reshape(1, -1), measured.use.reshape(1, -1))
-    solution = Solution(of.theta[np.newaxis], of.response.reshape(1, -1), slope[np.newaxis], np.ones(1, dtype=bool))
+    known = _determined(of.structure, of.weight.reshape(-1, 1) * slope)
+    solution = Solution(of.theta[np.newaxis], of.response.reshape(1, -1), (slope @ known)[np.newaxis], np.array([True]))
     share = np.where(measured.use, sigma / np.where(total > 0, total, 1.0), 0.0) ** 2
     dof = outputs.noise_dof / np.maximum(np.mean(share, axis=1, where=measured.use) ** 2, 1e-12)
-    return np.asarray(covariance(flat, solution, np.zeros(1), np.array([np.min(dof)]))[0])
+    return np.asarray(known @ covariance(flat, solution, np.zeros(1), np.array([np.min(dof)]))[0] @ known.T)
+
+
+def _determined(of: Structure, slope: Complex) -> Floats:
+    """Combinations of the parameters that are determined, (size, combinations), from weighted slopes.
+
+    Residual pairs and direct terms may replace each other: only what they do together is determined.
+    """
+    if not of.residual:
+        return np.eye(of.size)
+    nonlinear = np.arange(of.nonlinear) // 2
+    linear = np.arange(of.linear)
+    loose = np.concatenate(
+        [(nonlinear >= of.modes) & (nonlinear < of.pairs)]
+        + [(linear // 2 >= of.modes) & ((linear // 2 < of.pairs) | (linear >= of.linear - of.direct))] * of.outputs
+    )
+    firm, weak = np.flatnonzero(~loose), np.flatnonzero(loose)
+    scale = np.linalg.norm(slope[:, weak], axis=0) + 1e-300
+    _, size, axes = np.linalg.svd(stacked(slope[:, weak] / scale), full_matrices=False)
+    held = size > _SINGULAR * size[0]
+    known = np.zeros((of.size, firm.size + np.count_nonzero(held)))
+    known[firm, np.arange(firm.size)] = 1.0
+    known[weak, firm.size :] = axes[held].T / size[held] / scale[:, np.newaxis]
+    return known
 
 
 def left_over(outputs: Outputs, of: SeparatedFit) -> tuple[Floats, list[Floats]]:
@@ -132,6 +173,19 @@ def left_over(outputs: Outputs, of: SeparatedFit) -> tuple[Floats, list[Floats]]
     problem = _WeightedFit(outputs, of.structure, of.weight)
     residual = of.weight * np.where(outputs.measured.use, outputs.measured.value - of.response, 0.0)
     return stacked(residual.T).T, [q for q, *_ in problem.factors(of.theta)]
+
+
+def lost_without(outputs: Outputs, of: SeparatedFit) -> Floats:
+    """Increase of the weighted sum of squares without the columns of each pair, all poles at rest, (pairs,)."""
+    problem, lost = _WeightedFit(outputs, of.structure, of.weight), np.zeros(of.structure.pairs)
+    for weight, (_, linear, columns, _) in zip(of.weight, problem.factors(of.theta)):
+        left = stacked(weight[:, np.newaxis] * columns)
+        scale = np.linalg.norm(left, axis=0) + 1e-300
+        inverse = np.linalg.pinv(np.linalg.qr(left / scale)[1], rcond=1e-13)
+        size = (linear * scale)[: 2 * of.structure.pairs].reshape(-1, 2)
+        rows = inverse[: 2 * of.structure.pairs].reshape(-1, 2, inverse.shape[1])
+        lost += np.einsum("pi,pij,pj->p", size, np.linalg.pinv(rows @ rows.swapaxes(1, 2)), size)
+    return lost
 
 
 def stacked(values: NDArray[Any]) -> Floats:
