@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from livebode.core import Lines, Responses
 from livebode.fitting import EvaluationGrid, Fitter, TwoMass, fit
-from livebode.fitting.competitors import LAG, MODE, ExtendedModel
+from livebode.fitting.extended import LAG, MODE, ExtendedModel
 from livebode.simulation import BeltAxis, Mechanics
 from studies.result import Verdict
 

@@ -26,7 +26,7 @@ from livebode.analysis import MARGIN_NAMES as MARGINS
 from livebode.dashboard.quantities import QUANTITIES
 from livebode.estimation.verdicts import KINDS as DOUBTS
 from livebode.fitting import model_named
-from livebode.fitting.competitors import LAG, MODE, RESIDUAL, ExtendedModel
+from livebode.fitting.extended import LAG, MODE, RESIDUAL, ExtendedModel
 from livebode.fitting.models import MODELS
 from livebode.language import QUANTITY_NAMES
 from livebode.monitoring import ALARMS, RETURNS, UNMONITORED

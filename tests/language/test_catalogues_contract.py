@@ -13,8 +13,8 @@ from livebode.analysis import MARGIN_NAMES as MARGINS
 from livebode.analysis import MARGIN_WORDS
 from livebode.dashboard.quantities import QUANTITIES
 from livebode.fitting import model_named
-from livebode.fitting.competitors import WORDS as EFFECTS
-from livebode.fitting.competitors import ExtendedModel
+from livebode.fitting.extended import WORDS as EFFECTS
+from livebode.fitting.extended import ExtendedModel
 from livebode.fitting.models import MODELS
 from livebode.fitting.rows import SENTENCES as FITS
 from livebode.language import available

@@ -136,7 +136,7 @@ class LoopReport:
 
 
 def loop_report(fit: Fit, words: str, responses: Responses, loop: Loop) -> LoopReport:
-    """The report of a fit and of its responses."""
+    """The report of a fit and of its responses, with what the lines do not rule out in the bounds of its margins."""
     if fit.status != "ok":
         raise FitError(
             "not-fitted",
@@ -144,6 +144,7 @@ def loop_report(fit: Fit, words: str, responses: Responses, loop: Loop) -> LoopR
             "set fit.output, or fit another model",
             models=[fit.model.name],
         )
+    fit = fit.with_unseen()
     around = OpenLoop(fit.model, loop, fit.rate_hz, fit.hold)
     fits, mean = fit.parameters, mean_response(responses)
     fitted_to = fit.measured if fit.measured is not None else mean

@@ -9,17 +9,24 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from livebode.core import COVERAGE, FitError, Parameters, Response, Responses, not_installed, with_bound
+from livebode.core import COVERAGE, OK, FitError, Parameters, Response, Responses, not_installed, with_bound
 from livebode.dataclass import dataclass
-from livebode.fitting.competitors import WORDS, AllowedChanges, Competitor, compete, competitor, mixed, positive
+from livebode.fitting.averaging import Average, average, named_average, positive, specified
+from livebode.fitting.competitors import AllowedChanges, Competition, compete
+from livebode.fitting.extended import WORDS
+from livebode.fitting.family import FittedMember
 from livebode.fitting.fitter import Fitter
 from livebode.fitting.mean import mean_response
-from livebode.fitting.patterns import correlation, covariance, follows_pattern
+from livebode.fitting.patterns import correlation, covariance, follows_pattern, pattern_size
 from livebode.fitting.physical import DELAY, EvaluationGrid, Hold, PhysicalModel
-from livebode.fitting.problem import MeasuredRows
-from livebode.fitting.rows import NO_FIT, SENTENCES, fit_rows
+from livebode.fitting.problem import MeasuredRows, Problem
+from livebode.fitting.rows import NO_FIT, SENTENCES, FittedRows, fit_rows
 from livebode.fitting.transfer import to_discrete
+from livebode.fitting.weights import chi_squared, squares
 from livebode.language import Message
+
+EPSILON_LARGE = 0.1
+"""Model error as a share of |G| from which bounds are not called 95 % bounds, whatever its pattern."""
 
 _ROUNDING = 1e-9  # of a value: rounding gives a quantity of fixed values a bound of this size
 
@@ -49,6 +56,8 @@ class Fit:
         compliance". Values, bounds, response and margins include them.
     correlation
         Correlation of the residuals of neighbouring lines, if they follow a pattern that no model explains; else None.
+    averaged
+        Model and parameters of the average over all models that the lines do not tell apart; see `with_unseen`.
     refusal
         Why a fit whose search ended well has no numbers; see `refused`.
 
@@ -72,6 +81,7 @@ class Fit:
     asked: PhysicalModel | None = None
     taken: tuple[str, ...] = ()
     correlation: float | None = None
+    averaged: tuple[PhysicalModel, Parameters] | None = None
     refusal: str = ""
 
     def __repr__(self) -> str:
@@ -107,10 +117,21 @@ class Fit:
         ]
         return replace(self, parameters=blank[0], derived=blank[1], refusal=reason)
 
+    def with_unseen(self) -> Fit:
+        """This fit with every effect that the lines do not rule out among its parameters, for frequencies between and
+        beyond the lines: its values are the average over all models that the lines do not tell apart.
+        """
+        if self.averaged is None:
+            return self
+        model, parameters = self.averaged
+        fitted = set(self.parameters.names) - set(self.held)
+        held = {n: float(v) for n, v in zip(parameters.names, parameters.value[0]) if n not in fitted}
+        return replace(self, model=model, parameters=parameters, held=held, averaged=None)
+
     @property
     def complete(self) -> bool:
-        """Whether the bounds are 95 % bounds: no pattern is visible in the residuals."""
-        return self.correlation is None
+        """Whether the bounds are 95 % bounds: the residuals have no pattern, and beyond noise they are small."""
+        return self.correlation is None and not self.epsilon >= EPSILON_LARGE
 
     @property
     def about_bounds(self) -> str:
@@ -126,8 +147,16 @@ class Fit:
                     lacking=lacking,
                 )
             )
-        if self.correlation is None:
+        if self.complete:
             words.append(Message("± covers 95 %"))
+        elif self.correlation is None:
+            words.append(
+                Message(
+                    "model incomplete: it differs from the response by {percent:.2g} % of |G| more than noise "
+                    "explains; ± takes this error as independent from line to line, and is not a 95 % bound",
+                    percent=100 * self.epsilon,
+                )
+            )
         else:
             words.append(
                 Message(
@@ -273,30 +302,59 @@ def best_of(fitter: Fitter, parameters: Parameters, measured: Responses) -> Fit:
     if fitted.status[0] != "ok":
         return plain
     allowed = AllowedChanges(fitter.fixed, fitter.may_take_delay(), plain.band_hz[1])
-    late = (DELAY,) if problem is not fitter.problem else ()
-    every = compete(competitor(problem, rows, noise_dof, fitted, late), rows, noise_dof, allowed)
-    return _chosen(plain, every, rows, noise_dof)
+    competition = compete(fitter.problem, problem is not fitter.problem, fitted, rows, noise_dof, allowed)
+    return _chosen(plain, competition, rows, noise_dof) if competition.every else plain
 
 
-def _chosen(plain: Fit, every: list[Competitor], rows: MeasuredRows, noise_dof: NDArray[np.float64]) -> Fit:
-    """The best competitor as a Fit, with bounds that include the choice and its own model error."""
-    pattern = None
-    if follows_pattern(rows, every[0].fitted, noise_dof):
+def _chosen(plain: Fit, of: Competition, rows: MeasuredRows, noise_dof: NDArray[np.float64]) -> Fit:
+    """The average of the competitors as a Fit, with bounds that include the choice and its own model error."""
+    mean, best, pattern, taken = named_average(of), of.every[0].of, None, of.every[0].of.member.effects
+    problem, held, fitted = _as_fitted(of, mean, best, rows)
+    averaged: Average | None = average(of)
+    if follows_pattern(rows, fitted, noise_dof):
         # No model explains it: the specified model is as good as any, and the others show its possible error.
-        every = sorted(every, key=lambda c: len(c.taken))
-        pattern = correlation(rows, every[0].fitted)
-    problem, fitted, model = every[0].problem, every[0].fitted, every[0].problem.model
-    whole = mixed(every)
-    if pattern is not None:
-        whole = whole + positive(covariance(problem, rows, fitted) - fitted.covariance[0])
-    parameters = replace(
-        plain.parameters, model=model.name, names=model.names, units=model.units, value=fitted.values,
-        covariance=whole[np.newaxis], status=fitted.status, epsilon=fitted.epsilon, chi2=fitted.chi2, dof=fitted.dof,
-    )  # fmt: skip
+        pattern = correlation(rows, fitted)
+        mean, best, averaged, taken = specified(of), of.first, None, of.first.member.effects
+        problem, held, fitted = _as_fitted(of, mean, best, rows)
+        fitted = fitted._replace(epsilon=np.maximum(fitted.epsilon, pattern_size(rows, fitted)))
+        more = positive(covariance(problem, rows, fitted) - mean.covariance)
+        mean = replace(mean, covariance=mean.covariance + more)
+    parameters = _parameters(plain, mean, fitted)
+    model = mean.model
     derived = parameters.derived(model.derived_names, model.derived_units, model.derived)
     return replace(
-        plain, model=model, parameters=parameters, derived=derived, held=problem.held, taken=every[0].taken,
-        correlation=pattern,
+        plain, model=model, parameters=parameters, derived=derived, held=held, correlation=pattern,
+        taken=tuple(sorted(taken, key=lambda effect: -of.share(effect))),
+        averaged=None if averaged is None else (averaged.model, _parameters(plain, averaged, fitted)),
+    )  # fmt: skip
+
+
+def _parameters(plain: Fit, mean: Average, fitted: FittedRows) -> Parameters:
+    model = mean.model
+    return replace(
+        plain.parameters, model=model.name, names=model.names, units=model.units, value=mean.values[np.newaxis],
+        covariance=mean.covariance[np.newaxis], epsilon=fitted.epsilon, chi2=fitted.chi2, dof=fitted.dof,
+    )  # fmt: skip
+
+
+def _as_fitted(
+    of: Competition, mean: Average, best: FittedMember, rows: MeasuredRows
+) -> tuple[Problem, dict[str, float], FittedRows]:
+    """An average as the problem that it solves, the values that are not fitted, and a fit of one row."""
+    held = {name: float(v) for name, v in zip(mean.model.names, mean.values) if name not in mean.free}
+    problem = of.family.problem.variant(mean.model, held=held)
+    return problem, held, _rows(problem, mean.values, best, rows)
+
+
+def _rows(problem: Problem, values: NDArray[np.float64], best: FittedMember, rows: MeasuredRows) -> FittedRows:
+    """These values as a fit of one row, with the ε of the best model."""
+    value = values[np.newaxis]
+    response = problem.model.at(value, problem.grid)
+    residual, noise, _ = squares(rows, response)
+    blank = np.full((1, len(values), len(values)), np.nan)
+    return FittedRows(
+        value, blank, np.full(1, OK), np.array([best.epsilon]), chi_squared(residual, noise), np.array([best.dof]),
+        response, value,
     )  # fmt: skip
 
 

@@ -29,6 +29,14 @@ def correlation(measured: MeasuredRows, fitted: FittedRows) -> float:
     return neighbours(weight * (measured.value - fitted.response)[0, used])
 
 
+def pattern_size(measured: MeasuredRows, fitted: FittedRows) -> float:
+    """Size of the part of one row's residuals that neighbouring lines share, as a share of |G|; noise may hide it."""
+    used = measured.use[0]
+    size = np.abs(fitted.response)[0, used]
+    relative = np.abs((measured.value - fitted.response)[0, used]) / np.maximum(size, _ROUNDING * size.max())
+    return float(np.sqrt(max(correlation(measured, fitted), 0.0) * np.mean(relative**2)))
+
+
 def neighbours(residual: Complex) -> float:
     """Correlation of neighbours among weighted residuals (lines,); its deviation by chance is 1/√(2·lines)."""
     power = float(np.sum(np.abs(residual) ** 2))

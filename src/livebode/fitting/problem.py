@@ -182,14 +182,24 @@ class Problem:
         middle = np.array([p.start for p in self.model.parameters])
         return self.with_held(np.where(np.isfinite(starts), starts, middle).clip(low, high))
 
-    def solve(self, measured: MeasuredRows, weight: Floats, start: Floats, rounds: int = 30) -> tuple[Solution, Floats]:
-        """Least squares from `start` (rows, parameters), with the weights (rows, lines); and the cost (rows,)."""
+    def solve(
+        self,
+        measured: MeasuredRows,
+        weight: Floats,
+        start: Floats,
+        rounds: int = 30,
+        resting: NDArray[np.bool_] | None = None,
+    ) -> tuple[Solution, Floats]:
+        """Least squares from `start` (rows, parameters), with the weights (rows, lines); and the cost (rows,).
+
+        `resting` (rows, free) are those that keep their start in a row.
+        """
         value = np.where(measured.use, measured.value, 0.0)
         weight = np.where(measured.use, weight, 0.0)
         scale = self._scales(start)
 
         def normal(x: Floats) -> tuple[Floats, Floats, Floats, Complex, Complex]:
-            response, slope = self._slopes(x, start, scale)
+            response, slope = self._slopes(x, start, scale, resting)
             # One matrix of slopes followed by the residual: its square contains all that is needed.
             both = np.concatenate([slope, (response - value)[..., np.newaxis]], axis=-1) * weight[..., np.newaxis]
             square = (both.conj().swapaxes(1, 2) @ both).real
@@ -201,9 +211,10 @@ class Problem:
 
         with np.errstate(all="ignore"):
             low, high = self._bounds(scale)
-            minimum: Minimum = minimise(
-                normal, self._inward(start, scale), rounds, 1e-10, enough=_ENOUGH, low=low, high=high
-            )
+            begun = self._inward(start, scale)
+            if resting is not None:
+                low, high = np.where(resting, begun, low), np.where(resting, begun, high)
+            minimum: Minimum = minimise(normal, begun, rounds, 1e-10, enough=_ENOUGH, low=low, high=high)
         values = self._outward(minimum.parameters, start, scale)
         response, slope = minimum.known
         if self._unsized.any():
@@ -248,11 +259,21 @@ class Problem:
             values[..., self.free] = np.where(self._log, np.exp(x), x * scale)
         return values
 
-    def _slopes(self, x: Floats, start: Floats, scale: Floats) -> tuple[Complex, Complex]:
-        """Response (rows, lines) and its derivatives by the coordinates (rows, lines, free), by forward differences."""
-        n = x.shape[-1]
-        moved = np.empty((n + 1, *x.shape))
-        moved[:] = x
-        moved[np.arange(1, n + 1), :, np.arange(n)] += _STEP
-        every = self.model.at(self._outward(moved, np.broadcast_to(start, (n + 1, *start.shape)), scale), self.grid)
-        return every[0], np.moveaxis((every[1:] - every[0]) / _STEP, 0, -1)
+    def _slopes(
+        self, x: Floats, start: Floats, scale: Floats, resting: NDArray[np.bool_] | None = None
+    ) -> tuple[Complex, Complex]:
+        """Response (rows, lines) and its derivatives by the coordinates (rows, lines, free), by forward differences.
+
+        Those by coordinates that are at rest are zero.
+        """
+        rows, n = x.shape
+        moving = np.ones((n, rows), dtype=bool) if resting is None else ~resting.T
+        column, row = np.nonzero(moving)
+        moved = x[np.concatenate([np.arange(rows), row])]
+        moved[np.arange(rows, len(moved)), column] += _STEP
+        of = np.concatenate([np.arange(rows), row])
+        steps = scale if scale.ndim == 1 else scale[of]
+        every = self.model.at(self._outward(moved, start[of], steps), self.grid)
+        slope = np.zeros((n, rows, every.shape[-1]), dtype=np.complex128)
+        slope[column, row] = (every[rows:] - every[row]) / _STEP
+        return every[:rows], np.moveaxis(slope, 0, -1)

@@ -191,7 +191,7 @@ def _fitted(
     eps = np.full(len(dof), _FIRST_EPSILON) if epsilon is None else epsilon
     # Before a model is known the measured size replaces the model's.
     size = np.where(measured.use, np.abs(measured.value), 0.0)
-    weight = _weights(measured, size, eps)
+    weight = line_weights(measured, size, eps)
     solution = _begun(problem, measured, weight, start, dof)
     if epsilon is None:
         solution, eps = _reweighted(problem, measured, solution, dof)
@@ -203,7 +203,7 @@ def _fitted(
     return _judged(problem, measured, noise_dof, solution, eps, dof)
 
 
-def _weights(measured: MeasuredRows, size: Floats, epsilon: Floats) -> Floats:
+def line_weights(measured: MeasuredRows, size: Floats, epsilon: Floats) -> Floats:
     """Where neither noise nor ε is known, the weight of a line is its size."""
     by_noise = weights(measured.sigma, size, epsilon)
     unknown = ~(np.where(measured.use, by_noise, 0.0) > 0).any(axis=1)
@@ -246,7 +246,7 @@ def _reweighted(problem: Problem, measured: MeasuredRows, solution: Solution, do
         if same.all():
             break
         eps = np.where(same, eps, new)
-        weight = _weights(measured, np.abs(solution.response), eps)
+        weight = line_weights(measured, np.abs(solution.response), eps)
         again, _ = problem.solve(measured, weight, solution.values)
         for kept, other in zip(solution, again):
             kept[~same] = other[~same]
@@ -291,7 +291,7 @@ def covariance(measured: MeasuredRows, solution: Solution, eps: Floats, noise_do
     many parameters as data the weights have no effect.
     """
     size = np.abs(solution.response)
-    weight = np.where(measured.use, _weights(measured, size, eps), 0.0)
+    weight = np.where(measured.use, line_weights(measured, size, eps), 0.0)
     left = weight[..., np.newaxis] * solution.slope
     matrix = (left.conj().swapaxes(1, 2) @ left).real
     share = np.where(measured.sigma > 0, measured.sigma * weight, 0.0) ** 2 / 2

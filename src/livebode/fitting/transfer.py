@@ -18,12 +18,14 @@ _TINY = 1e-300  # avoids 0/0, and vanishes beside any other number
 class Transfer(NamedTuple):
     """N(s)/(s^integrators · D(s)): coefficients from the highest power on, shape (..., degree + 1).
 
-    The shapes of both are broadcast, so that several numerators may share a denominator.
+    The shapes of both are broadcast, so that several numerators may share a denominator. `known` are the
+    roots of D, where they are known.
     """
 
     numerator: Floats
     denominator: Floats
     integrators: int
+    known: Complex | None = None
 
     @classmethod
     def of(cls, numerator: Sequence[ArrayLike], denominator: Sequence[ArrayLike]) -> Transfer:
@@ -94,6 +96,8 @@ class Transfer(NamedTuple):
 
     def poles(self) -> Complex:
         """Poles without the integrators, shape (..., poles); equal ones are moved apart by a hundred-thousandth."""
+        if self.known is not None:
+            return self.known.copy()
         poles = roots(self.denominator)
         if poles.shape[-1] == 2:
             near = np.abs(poles[..., 0] - poles[..., 1]) < _APART * np.abs(poles[..., 0])

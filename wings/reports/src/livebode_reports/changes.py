@@ -107,6 +107,7 @@ def _margins(fit: Fit, loop: LoopSection) -> Margins | None:
     built = loop.build(fit.rate_hz)
     if built.feedback is None:
         return None
+    fit = fit.with_unseen()
     result = margins(fit.parameters, OpenLoop(fit.model, built, fit.rate_hz, fit.hold), fit.band_hz)
     return result if fit.measured is None else against_lines(result, fit.measured, built)
 

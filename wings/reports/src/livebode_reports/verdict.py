@@ -142,7 +142,7 @@ def _fits(of: ReportData) -> list[Finding]:
             "one model of the mean is not valid: see the fits over the run.",
             **values,
         )
-    findings = [Finding("check" if rough else "ok", text)]
+    findings = [Finding("check" if rough or not of.fit.complete else "ok", text)]
     for track in of.tracks.values():
         if track.model != MARGINS and (why := failed(track)):
             every, rejected = fitted(track), sum(why.values())
