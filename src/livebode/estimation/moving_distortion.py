@@ -18,8 +18,7 @@ _OUTSIDE = _BESIDE = 4  # detection lines outside of the lines, and of each side
 _ON_BIN = 0.1  # bins: hum this close to a bin repeats with the excitation
 _LINES_BESIDE = 4  # of each side of a detection line, whose skirts are counted
 _FORGETTING = 0.8  # of one pair of periods to the next: about five pairs are remembered
-_PAIRS_MIN = 1.7  # sum of the weights of two pairs
-_STEADY = 0.03  # change of the travel of a period relative to it, from which on the motion itself leaks
+_STEADY = 0.03  # of the travel of two periods: with a larger change from one to the other the motion itself leaks
 _SKIRTS = 2.0  # times the predicted power of the skirts: half of an amplitude is not predicted near a resonance
 _CHANCE = 2.5  # standard deviations of what noise alone repeats
 _SMOOTH = 2  # detection lines on each side that are judged together
@@ -149,7 +148,11 @@ class MovingDistortion(StatefulBase):
         travel, bend = self._position[2] - self._position[0], np.diff(self._position, 2)[0]
         self._even = bool(abs(bend) < _STEADY * abs(travel))
         self._skirts = np.stack([self._skirts[1], skirts])
-        return self._even and was_even and self._add_pair() and self._judge()
+        if not (self._even and was_even):
+            return False
+        self._add_pair()
+        self._judge()
+        return True
 
     def _remember(self, period: PeriodAtBins, excited: Flags) -> None:
         """Shift the newest three periods."""
@@ -173,17 +176,16 @@ class MovingDistortion(StatefulBase):
         of_output, of_input = (times(self._kernel, x[self._beside]).sum(axis=1) for x in (change, inside))
         return np.stack([of_output, times(self._interpolation.at(self._plant[1]), of_input)])
 
-    def _add_pair(self) -> bool:
-        """Add the older two of the three periods, and return whether there are enough pairs."""
+    def _add_pair(self) -> None:
+        """Add the older two of the three periods."""
         older, newer = self._residual[:2]
         self._weights = self._weights * (_FORGETTING, _FORGETTING**2) + 1
         share = 1 / self._weights[0]
         _average(self._repeats, times(newer, older.conj()), share)
         _average(self._explained, times(self._skirts[1], self._skirts[0].conj()), share)
         _average(self._power, (power(newer) + power(older)) / 2, share)
-        return bool(self._weights[0] > _PAIRS_MIN)
 
-    def _judge(self) -> bool:
+    def _judge(self) -> None:
         skirts = magnitude(self._explained).min(axis=0)
         beyond = self._repeats.real - np.abs(self._repeats.imag) - _SKIRTS * skirts
         share = np.nan_to_num(beyond / self._power)
@@ -199,7 +201,6 @@ class MovingDistortion(StatefulBase):
         self.distortion = _COHERENT * stronger * worst / magnitude(self._input[1])
         self.share = self.distortion / plant
         self.invalid = (self.share > _DISTORTED) & (significant[self._near].max(axis=1) > _DISTORTED)
-        return True
 
 
 def _skirts_of(bins: NDArray[np.int64], free: NDArray[np.int64], window: int) -> tuple[NDArray[np.int64], Complex]:
