@@ -64,7 +64,7 @@ def test_an_axis_that_moves_is_seen_wherever_it_is(name: str, offset: float, uni
     tracker, responses, events = tracked(offset + unit * MOVING[name])
     assert [event.kind for event in events] == ["noise-from-detection-lines"]
     assert tracker.found()["judged"]["noise_from_detection_lines"] > 0.8 * len(responses)
-    assert np.isnan(responses.distortion[-1]).all()
+    assert not np.any(responses.distortion[-1] > 0.01)  # a linear machine, judged in motion where that is steady
 
 
 @pytest.mark.parametrize("hop", [800, 200, 40])

@@ -126,11 +126,11 @@ def _process(s: LineSettings, moments: LineMoments, w: LineWindows) -> tuple[Lin
     valid = seen[:, np.newaxis] & excited & np.isfinite(value)
     distortion = np.full(value.shape, np.nan)
     if w.distortion is not None:
-        distortion = np.where(moving[:, np.newaxis], np.nan, w.distortion[w.verdict])
+        distortion = w.distortion[w.verdict]
         variance, dof = _contained(variance, dof, distortion, w.dof_repeating)
     distortion = np.where(valid, distortion, np.nan)
     if w.invalid is not None:
-        against = w.invalid[w.verdict] & ~moving[:, np.newaxis]
+        against = w.invalid[w.verdict]
         distortion, valid = np.where(valid & against, np.inf, distortion), valid & ~against
     weight = _weight(s, means, pair, power)
     several = valid & np.isfinite(sums.dof)[:, np.newaxis]

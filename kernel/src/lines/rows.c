@@ -170,7 +170,7 @@ LB_INLINE void widen(const job *j, row_facts *f, size_t first, size_t count, est
 {
     const double *known = j->in->distortion + (size_t)j->in->verdict[f->row] * j->m->lines + first;
     const double noise_share = 1.0 / f->dof, added_share = 1.0 / j->s->dof_repeating;
-    const lb_lanes distortion = f->moving ? lb_all(NOT_A_NUMBER) : lb_load(known, count), noise = e->variance;
+    const lb_lanes distortion = lb_load(known, count), noise = e->variance;
     const lb_lanes added = lb_select(lb_are_finite(distortion), distortion * distortion, lb_all(0.0));
     const lb_lanes together = noise + added;
     const lb_lanes dof = together * together / (noise * noise * noise_share + added * added * added_share);
@@ -255,7 +255,7 @@ LB_INLINE lb_mask write_verdicts(const job *j, const row_facts *f, size_t first,
 {
     lb_lanes distortion = lb_select(e->valid, e->distortion, lb_all(NOT_A_NUMBER));
     lb_mask valid = e->valid;
-    if (j->in->invalid && !f->moving) {
+    if (j->in->invalid) {
         const size_t at = (size_t)j->in->verdict[f->row] * j->m->lines + first;
         const lb_mask against = lb_load_flags(j->in->invalid + at, count);
         distortion = lb_select(valid & against, lb_all(infinite.value), distortion);

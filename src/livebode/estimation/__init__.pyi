@@ -12,8 +12,11 @@ from livebode.estimation.line_stage import response_unit as response_unit
 from livebode.estimation.line_stage import source_unit as source_unit
 from livebode.estimation.movement import PLACES as PLACES
 from livebode.estimation.movement import Movement as Movement
+from livebode.estimation.moving_periods import MovingPeriods as MovingPeriods
+from livebode.estimation.moving_periods import PeriodClock as PeriodClock
 from livebode.estimation.nonperiodic_stage import separable as separable
 from livebode.estimation.nonperiodic_tracker import NonPeriodicTracker as NonPeriodicTracker
+from livebode.estimation.periods import Periods as Periods
 from livebode.estimation.quantities import convert as convert
 from livebode.estimation.quotient import WINDOW_MIN as WINDOW_MIN
 from livebode.estimation.quotient import LocalPolynomial as LocalPolynomial

@@ -194,10 +194,10 @@ class LineStage(StatefulBase):
         moving = self._moves(series, centre, rows.sample)
         first = rows.sample - s.lines.window + 1
         noise = self._detected(signals)
-        distortion, invalid, verdict, dof_repeating = None, None, None, np.inf
+        distortion, against, invalid, verdict, dof_repeating = None, None, None, None, np.inf
         if repeating is not None:
-            distortion, verdict, dof_repeating = repeating.distortion, repeating.verdict, repeating.dof
-            invalid = None if self._converts else repeating.invalid
+            distortion, against, verdict = repeating.of(moving)
+            dof_repeating, invalid = repeating.dof, None if self._converts else against
         windows = LineWindows(
             self._largest,
             series,
@@ -219,8 +219,8 @@ class LineStage(StatefulBase):
             estimates = estimates.with_ripple(ripple, power(signals[s.method.denominator][:, :lines]))
         if self._converts:
             estimates = estimates.converted(s)
-            if repeating is not None:
-                estimates = estimates.without(_where_not(repeating.invalid[repeating.verdict], moving))
+            if against is not None:
+                estimates = estimates.without(against[verdict])
         if self._periodicity is not None:
             input_ = signals["input"][:, :lines]
             leaks = self._periodicity.process(input_, results.usable, rows.sample, centre[0])

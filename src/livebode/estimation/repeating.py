@@ -14,11 +14,12 @@ from livebode.dataclass import dataclass
 from livebode.estimation.hum import SilentHum, may_disturb
 from livebode.estimation.levels import DistortionLevels
 from livebode.estimation.movement import PLACES, Movement
+from livebode.estimation.moving_periods import MovingPeriods, MovingVerdicts, PeriodClock
 from livebode.estimation.periods import PeriodCutter, PeriodMoments, Periods
 from livebode.estimation.silence_search import HumSpan, SilenceSearch, SilentStretch, updated
 from livebode.estimation.spectra import SpectraRows
 from livebode.estimation.tracker_settings import Settings
-from livebode.estimation.verdicts import HUM, KINDS, Verdict, by_chance, judge_of, reason
+from livebode.estimation.verdicts import DISTORTED, HUM, KINDS, Verdict, by_chance, judge_of, reason
 from livebode.kernel import ADDED, FORGOTTEN, NEWS, NEWS_GONE, PeriodSpectra, PeriodState, PeriodVerdicts
 from livebode.language import Message
 
@@ -37,21 +38,33 @@ class RepeatingVerdicts:
         Which one is that of a window: of the periods before it, shape (rows,).
     dof
         Degrees of freedom of `distortion`.
+    in_motion
+        The verdicts that apply where the machine moves.
     """
 
     distortion: Floats
-    invalid: NDArray[np.bool_]
+    invalid: Flags
     verdict: NDArray[np.int64]
     dof: float
+    in_motion: MovingVerdicts
+
+    def of(self, moving: Flags | None) -> tuple[Floats, Flags, NDArray[np.int64]]:
+        """Verdicts, and which one is that of each window; `moving`: in which windows the machine moves, if known."""
+        moves = self.in_motion.moves[self.verdict] if moving is None else moving
+        if not moves.any():
+            return self.distortion, self.invalid, self.verdict
+        distortion = np.concatenate([self.distortion, self.in_motion.distortion])
+        invalid = np.concatenate([self.invalid, self.in_motion.invalid])
+        return distortion, invalid, self.verdict + np.where(moves, len(self.distortion), 0)
 
 
 class RepeatingErrors(PeriodCutter):
     """Detects in whole periods of the signals what repeats with the excitation but is not a linear response.
 
-    One DFT a period, of the samples between the multiples of N. Periods with a sample that is left out, and periods in
-    which the machine moves, do not count; a start, a gap, a pause or another phase of the excitation and a movement
-    restart the mean over periods. A verdict applies from the next window on and is never averaged; after a gap or a
-    pause the previous verdict applies until the next one.
+    One DFT a period, of the samples between the multiples of N. Periods with a sample that is left out do not count; a
+    start, a gap, a pause or another phase of the excitation and a movement restart the mean over periods. A verdict
+    applies from the next window on and is never averaged; after a gap or a pause the previous verdict applies until the
+    next one. Periods in which the machine moves have verdicts of their own, of distortion alone (`MovingPeriods`).
 
     The periods of a Block are computed together, with the same results as one by one.
 
@@ -61,6 +74,8 @@ class RepeatingErrors(PeriodCutter):
     ----------
     settings
         Lines, signals and estimator.
+    in_motion
+        Whether periods in which the machine moves are judged.
 
     Attributes
     ----------
@@ -68,13 +83,13 @@ class RepeatingErrors(PeriodCutter):
         Even and odd distortion.
     """
 
-    _stage = Stage("repeating-errors", 4)
+    _stage = Stage("repeating-errors", 5)
     _STATE = (
         *PeriodCutter._STATE, "_output", "_told", "_largest", "_step", "_moments",
-        "_movement", "_silence", "levels", "_silent_hum", "_search",
+        "_movement", "_silence", "levels", "_silent_hum", "_search", "_in_motion",
     )  # fmt: skip
 
-    def __init__(self, settings: Settings, events: list[Event] | None = None) -> None:
+    def __init__(self, settings: Settings, events: list[Event] | None = None, *, in_motion: bool = True) -> None:
         lines = settings.lines
         super().__init__(lines.window, np.array(settings.differenced_roles))
         self._settings, self._judge = settings, judge_of(settings, None)
@@ -95,6 +110,7 @@ class RepeatingErrors(PeriodCutter):
         self._told = np.zeros((len(KINDS), len(lines)), dtype=np.bool_)
         self._events = [] if events is None else events
         self._dof = self._judge.distortion.dof if self._judge.distortion else np.inf
+        self._in_motion = MovingPeriods(settings, self._events, enabled=in_motion)
 
     def _state(self) -> dict[str, Any]:
         return super()._state() | {
@@ -112,10 +128,15 @@ class RepeatingErrors(PeriodCutter):
         f = self._settings.lines.frequency_hz
         told = self._told.copy()
         told[HUM] |= self._known_hum()
+        told[DISTORTED] |= self._in_motion.told
         reasons = {kind: f[told[i]].tolist() for i, kind in enumerate(KINDS) if told[i].any()}
-        newest = [None if np.isnan(d) else float(d) for d in self._now.distortion * self._judge.to_output]
+        now, moving = (
+            [None if np.isnan(d) else float(d) for d in row]
+            for row in (self._now.distortion * self._judge.to_output, self._in_motion.distortion)
+        )
         return {
-            "distortion": None if self._judge.distortion is None else newest,
+            "distortion": None if self._judge.distortion is None else now,
+            "distortion_in_motion": moving,
             "invalid_lines_hz": reasons,
             "mains_lines_hz": f[self._judge.mains.lines.any(axis=0)].tolist(),
         } | ({"levels": levels} if (levels := self.levels.plain()) else {})
@@ -143,6 +164,7 @@ class RepeatingErrors(PeriodCutter):
             self._process_silence(stretch, time_s)
         self._begin_at(sample)
         self.levels.end_stretch()
+        self._in_motion.end_stretch()
         self._moments.forget()
         self._output[:] = 0
         self._silence.interrupt()
@@ -170,6 +192,7 @@ class RepeatingErrors(PeriodCutter):
         which = (rows.sample - block.start + self._at) // self._window  # so many periods end before
         kind = next((c.stated_kind for c in block.channels if c.name == self._settings.output), None)
         self._judge = judge_of(self._settings, kind)
+        self._in_motion.begin()
         begun, verdicts = self._now, [self._verdicts(periods, block, kind) for periods in cut]
         if not verdicts:
             now = begun.distortion[np.newaxis], np.logical_or.reduce(begun.against, axis=0, keepdims=True)
@@ -177,11 +200,12 @@ class RepeatingErrors(PeriodCutter):
             now = verdicts[0].distortion, verdicts[0].invalid
         else:
             now = _joined([part.distortion for part in verdicts]), _joined([part.invalid for part in verdicts])
+        in_motion = self._in_motion.verdicts()
         hum = self._hum_of_windows(data, rows.sample, block, aside)
         if hum is None or not hum.any():
-            return RepeatingVerdicts(now[0] * self._judge.to_output, now[1], which, self._dof)
-        distortion = now[0][which] * self._judge.to_output
-        return RepeatingVerdicts(distortion, now[1][which] | hum, np.arange(which.size), self._dof)
+            return RepeatingVerdicts(now[0] * self._judge.to_output, now[1], which, self._dof, in_motion)
+        distortion, invalid = now[0][which] * self._judge.to_output, now[1][which] | hum
+        return RepeatingVerdicts(distortion, invalid, np.arange(which.size), self._dof, in_motion.at(which))
 
     def _hum_of_windows(
         self, data: Floats, sample: NDArray[np.int64], block: Block, aside: NDArray[np.intp]
@@ -218,10 +242,14 @@ class RepeatingErrors(PeriodCutter):
         """Verdicts before and after each of these periods."""
         with np.errstate(all="ignore"):  # an incomplete period is not used
             spectra = np.fft.rfft(periods.signals)
+        moves = self._moves(periods)
+        unit = next((channel.unit for channel in block.channels if channel.name == self._settings.schedule), "")
+        clock = PeriodClock(block.start + periods.stop - 1, block.origin_s, unit)
+        self._in_motion.process(spectra, periods, moves, clock)
         now = PeriodSpectra(
             spectra,
             periods.complete,
-            self._moves(periods),
+            moves,
             self._now.distortion,
             self._now.against,
             lambda period: step_of(periods.signals[0, period]),

@@ -63,6 +63,8 @@ class Tracker(StreamEstimator[InputStatistics]):
         Lines, signals, estimator and options.
     repeating
         Whether to detect errors that repeat with the excitation (`RepeatingErrors`); not for residuals of a model.
+    in_motion
+        Whether to detect them while the machine moves, too; not where a model of the motion shows them better.
 
     Examples
     --------
@@ -82,7 +84,7 @@ class Tracker(StreamEstimator[InputStatistics]):
     _stage = Stage("tracker", 1)
     _lines: LineStage
 
-    def __init__(self, settings: Settings, *, repeating: bool = True) -> None:
+    def __init__(self, settings: Settings, *, repeating: bool = True, in_motion: bool = True) -> None:
         self.settings = settings
         self._roles = settings.roles
         self._events: list[Event] = []
@@ -99,7 +101,7 @@ class Tracker(StreamEstimator[InputStatistics]):
         )
         self._centre = Centre(window)
         self._speed = RippleSpeed(settings.lines) if settings.ripple else None
-        self._repeating = RepeatingErrors(settings, self._events) if repeating else None
+        self._repeating = RepeatingErrors(settings, self._events, in_motion=in_motion) if repeating else None
         self._watch = InputStatistics(self._events, window)
         self._end, self._aside = (0, 0.0), NOTHING
         self._trend: SignalTrend | None = None

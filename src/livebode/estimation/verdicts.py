@@ -190,7 +190,7 @@ def by_chance(known: int, dof: float) -> float:
 Reason = tuple[Message, dict[str, float]]
 
 KINDS = ("distorted", "hum", "steps")
-HUM = KINDS.index("hum")
+DISTORTED, HUM = KINDS.index("distorted"), KINDS.index("hum")
 _JUDGED_PER_S = 10  # times at most; for short periods a verdict in each period is not needed
 
 

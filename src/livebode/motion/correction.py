@@ -28,6 +28,7 @@ from livebode.motion.learner import Learner, ReplayResult, frozen
 from livebode.motion.model import MovingModel
 from livebode.motion.orders import RippleMonitor
 from livebode.motion.replay import Scatter, by_excitation, drive_of, residual
+from livebode.motion.residual_distortion import ResidualDistortion, widened
 from livebode.motion.standstill import StandstillDetector, without
 
 
@@ -179,7 +180,7 @@ class MotionCorrection(StatefulBase):
     (600, 0.0028, 500000.0)
     """
 
-    _stage = Stage("motion-correction", 1)
+    _stage = Stage("motion-correction", 2)
 
     def __init__(
         self,
@@ -207,7 +208,8 @@ class MotionCorrection(StatefulBase):
         names = [settings.excitation or settings.input, settings.input, settings.output, settings.schedule]
         self._names = [name for name in names if name]
         # Sigma is from the residual of the model, which does not contain the motion.
-        self._tracker = Tracker(replace(settings, noise="periods") if settings.noise == "auto" else settings)
+        own = replace(settings, noise="periods") if settings.noise == "auto" else settings
+        self._tracker = Tracker(own, in_motion=False)  # what the model leaves shows distortion better
         self._events: list[Event] = []
         self._recorded = RecentSamples(self._names, lines)
         self._waiting = PendingResponses(lines)
@@ -215,6 +217,7 @@ class MotionCorrection(StatefulBase):
         self._scatter = Scatter(settings)
         self._standstill = StandstillDetector(settings, self._events)
         self._ripple = RippleMonitor(settings)
+        self._distortion = ResidualDistortion(settings, self._events)
         self._from, self._aside = 0, NOTHING
         self._parts: dict[str, StatefulBase] = {
             "tracker": self._tracker,
@@ -224,6 +227,7 @@ class MotionCorrection(StatefulBase):
             "scatter": self._scatter,
             "standstill": self._standstill,
             "ripple": self._ripple,
+            "distortion": self._distortion,
         }
 
     @property
@@ -353,12 +357,17 @@ class MotionCorrection(StatefulBase):
             self._ripple.process(left, chunk, now.model)
         with np.errstate(invalid="ignore", divide="ignore"):
             ripple = np.abs(value) * np.sqrt(self._ripple.power(chunk, tracked.sample)) / chunk.torque
+        moving, against = self._distortion.process(left, chunk, tracked)
+        at_standstill = np.isfinite(tracked.distortion)
+        distortion = np.where(at_standstill, tracked.distortion, moving)
+        valid &= at_standstill | ~against
         return replace(
             tracked,
             value=np.where(valid, value, complex(np.nan, np.nan)),
-            sigma=np.where(valid, np.hypot(seen.sigma * scale, ripple), np.nan),
+            sigma=np.where(valid, widened(np.hypot(seen.sigma * scale, ripple), distortion), np.nan),
             dof=seen.dof,
             valid=valid,
+            distortion=np.where(against & ~at_standstill, np.inf, distortion),
         )
 
     def _replayed(self, model: MovingModel, tracked: Responses, chunk: Chunk) -> ReplayResult:

@@ -20,6 +20,7 @@ from livebode_design.design import Choice, Design
 from livebode_design.grid import LineChoice, grid
 from livebode_design.limits import MachineLimits, beyond, check_known, room
 from livebode_design.machine import UNITS, Machine, Quantity
+from livebode_design.reversal import reversal
 from livebode_design.spec import ExperimentSpec
 
 _LISTED_MAX = 4  # amplitudes
@@ -47,6 +48,10 @@ def explained(design: Design, choice: LineChoice, amplitude_why: str, recording_
         ),
     ]
     rows += [_limit_row(peak, design.limits) for peak in worst(design.peaks).values()]
+    if (turned := reversal(waveform, machine)) is not None:
+        rows.append(
+            Choice("reversal", *turned.words(None if design.spec.listed else float(np.max(design.amplitude_n_m))))
+        )
     if machine.loop.feedback is not None:
         rows.insert(1, _for_tuning(machine, float(f[-1])))
     if machine.noise > 0:

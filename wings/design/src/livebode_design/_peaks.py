@@ -60,17 +60,24 @@ def peaks(waveform: Waveform, machine: Machine) -> tuple[Peak, ...]:
         If the excitation has power where the machine is not known.
     """
     window, rate_hz = waveform.lines.window, waveform.lines.rate_hz
+    spectrum, excited = played(waveform, machine)
+    return tuple(
+        _peak(quantity, place, response, spectrum, excited, window)
+        for place in machine.places
+        for quantity, response in machine.responses(place, excited * rate_hz / window).items()
+    )
+
+
+def played(waveform: Waveform, machine: Machine) -> tuple[NDArray[np.complex128], NDArray[np.int64]]:
+    """Spectrum of a period, and the bins with power at which the machine is known."""
+    window, rate_hz = waveform.lines.window, waveform.lines.rate_hz
     spectrum = np.fft.rfft(waveform.samples)
     # The integrators of the loop remove a constant.
     excited = np.flatnonzero(np.abs(spectrum) > _POWERLESS * np.max(np.abs(spectrum)))
     excited = excited[excited > 0]
     if machine.band_hz is not None and "resolution_n_m" in waveform.about:
         excited = excited[within(excited * rate_hz / window, machine.band_hz)]
-    return tuple(
-        _peak(quantity, place, response, spectrum, excited, window)
-        for place in machine.places
-        for quantity, response in machine.responses(place, excited * rate_hz / window).items()
-    )
+    return spectrum, excited
 
 
 def _peak(

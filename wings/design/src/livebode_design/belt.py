@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from livebode.arrays import Floats
 from livebode.simulation import BeltAxis, Sampled, SimulatedAxis
 from livebode_design.machine import STANDSTILL, Extremes, Machine, OperatingPoint, Quantity, check_noise
+from livebode_design.reversal import slowest_stroke
 
 _PLACES = 9
 _STANDSTILL_S = 2.0  # of the simulation that finds the effect of the noise alone
@@ -25,7 +26,7 @@ def belt_machine(axis: BeltAxis) -> Machine:
     """
     check_noise(axis.sensor.noise_rad_per_s)
     quiet = replace(axis, excitation_n_m=np.zeros(0), faults=(), run_in_s=0.0)
-    position_m, _ = axis.motion.cycle(axis.drive.rate_hz)
+    position_m, speed_m_per_s = axis.motion.cycle(axis.drive.rate_hz)
     moves = position_m.size > 1
     low, high = float(position_m.min()), float(position_m.max())
     at_m = np.linspace(low, high, _PLACES) if moves else np.array([low])
@@ -48,6 +49,7 @@ def belt_machine(axis: BeltAxis) -> Machine:
         stroke_s=seconds / 2 if moves else None,
         encoder_step_m=radius * axis.sensor.encoder_step_rad,
         notes=(_DRY,) if axis.friction.dry and not moves else (),
+        slowest_m_per_s=slowest_stroke(speed_m_per_s),
     )
 
 

@@ -96,6 +96,8 @@ class Machine:
         Band in which the responses are known; None: everywhere.
     encoder_step_m
         Travel of the motor per count of its encoder; 0 where it is not known.
+    slowest_m_per_s
+        Speed of the slowest stroke of the motion; None at standstill or where it is not known.
     """
 
     places: tuple[OperatingPoint, ...]
@@ -106,6 +108,7 @@ class Machine:
     notes: tuple[str, ...] = ()
     band_hz: tuple[float, float] | None = None
     encoder_step_m: float = 0.0
+    slowest_m_per_s: float | None = None
 
     def __post_init__(self) -> None:
         if not self.places:

@@ -182,8 +182,13 @@ def measured_machine(
     step_m = 2 * np.pi * radius_m / encoder_counts_per_turn if encoder_counts_per_turn > 0 else 0.0
     return Machine(
         places=(place,), loop=loop, rate_hz=rate_hz, noise=noise, stroke_s=stroke_s, notes=notes, band_hz=band_hz,
-        encoder_step_m=step_m,
+        encoder_step_m=step_m, slowest_m_per_s=_slowest(own) if stroke_s is not None else None,
     )  # fmt: skip
+
+
+def _slowest(motion: Extremes) -> float | None:
+    """Speed of the slower one of both directions, None where it is not known."""
+    return min((abs(speed) for speed in motion.get("speed", ()) if speed), default=None)
 
 
 def _motion(given: Extremes, stroke_s: float | None) -> Extremes:

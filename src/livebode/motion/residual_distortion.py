@@ -1,0 +1,68 @@
+"""Distortion in what a moving model leaves of the output."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from livebode.arrays import Flags, Floats
+from livebode.core import Event, Responses, Stage, StatefulBase
+from livebode.estimation import MovingPeriods, PeriodClock, Periods, Settings
+from livebode.motion.chunk import Chunk
+
+
+class ResidualDistortion(StatefulBase):
+    """Distortion of the responses of each chunk, from the residual r = y − y_model at the detection lines.
+
+    The residual contains neither the motion nor the change of the machine, as far as the model explains them, so that
+    less than in the output itself is taken for skirts (`MovingDistortion`). Responses before the first verdict have
+    that of their chunk.
+
+    Parameters
+    ----------
+    settings
+        Lines, signals and estimator.
+    events
+        Receives an Event for each line that becomes invalid.
+    """
+
+    _stage = Stage("residual-distortion", 1)
+    _STATE = ("_periods", "_stop")
+
+    def __init__(self, settings: Settings, events: list[Event]) -> None:
+        self._settings, self._window = settings, settings.lines.window
+        self._periods = MovingPeriods(settings, events, of_residual=True)
+        self._stop = -1  # number of the sample after the newest period
+
+    def process(self, residual: Floats, chunk: Chunk, tracked: Responses) -> tuple[Floats, Flags]:
+        """Distortion and whether it makes a line invalid, (rows, lines); `residual` is NaN where it does not count."""
+        window, lines = self._window, self._settings.lines
+        begin = -(-max(chunk.first - window + 1, chunk.start) // window) * window
+        count = max((chunk.stop - begin) // window, 0)
+        if begin != self._stop:
+            self._periods.end_stretch()
+        self._periods.begin()
+        if count:
+            self._stop = begin + count * window
+            origin_s = float(tracked.time_s[0]) - (int(tracked.sample[0]) - (window - 1) / 2) / lines.rate_hz
+            self._add(residual, chunk, begin, count, PeriodClock(begin + window - 1, origin_s, "m"))
+        verdicts = self._periods.verdicts()
+        ended = ((tracked.sample + 1 - begin) // window).clip(0, count)
+        known = np.flatnonzero(np.isfinite(verdicts.distortion[:, 0]))
+        if known.size:
+            ended = np.maximum(ended, known[0])
+        return verdicts.distortion[ended], verdicts.invalid[ended]
+
+    def _add(self, residual: Floats, chunk: Chunk, begin: int, count: int, clock: PeriodClock) -> None:
+        channels = {"output": chunk.y, "input": chunk.u, "excitation": chunk.w}
+        rows: list[Floats] = [channels[role] for role in self._settings.roles]
+        part = slice(begin - chunk.start, begin - chunk.start + count * self._window)
+        signals = np.array([row[part].reshape(count, self._window) for row in (*rows, residual)])
+        complete = np.isfinite(signals).all(axis=(0, 2))
+        spectra = np.fft.rfft(np.nan_to_num(signals))
+        periods = Periods(signals, chunk.x[part].reshape(count, self._window), complete, self._window)
+        self._periods.process(spectra, periods, np.ones(count, dtype=np.bool_), clock)
+
+
+def widened(sigma: Floats, distortion: Floats) -> Floats:
+    """Sigma with the distortion where it is known."""
+    return np.asarray(np.hypot(sigma, np.where(np.isfinite(distortion), distortion, 0.0)))
