@@ -36,7 +36,7 @@ RATE_HZ, WINDOW, LINES, HOP, TRACKED_S = 4000.0, 400, 7, 2000, 60.0
 AXES, SECONDS, EVERY_S, RESPONSES_PER_S = 10, 3000.0, 2.0, 2.0
 COMMITTED = round(60 / EVERY_S)
 SCATTER = 1e-2
-SCATTERED = "value", "sigma", "coherence", "input_coherence", "distortion", "weight"
+SCATTERED = "value", "sigma", "coherence", "input_coherence", "distortion", "variation", "weight"
 PARAMETERS = 2
 BEGIN_S = 1.7e9
 """A day long ago, whose files are joined."""

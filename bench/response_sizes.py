@@ -28,7 +28,7 @@ from livebode_plant.lake.wide_responses import from_wide, to_wide, wide_options
 RATE_HZ, WINDOW, HOP, SECONDS = 4000.0, 400, 20, 60.0
 COUNTS = 1, 7, 21, 101
 AMPLITUDE_N_M, NOISE_RAD_PER_S = 0.3, 0.05
-LEFT_OUT = {"weight_re", "weight_im", "input_coherence", "distortion"}
+LEFT_OUT = {"weight_re", "weight_im", "input_coherence", "distortion", "variation"}
 TARGET_WIDE, TARGET_LONG, TARGET_LINES = 85, 236, 7
 AXES_IN_MESSAGE, EACH = 20, 8
 

@@ -54,10 +54,11 @@ static uint64_t hashed(uint64_t hash, const double *data, size_t count)
 
 static lb_line_moments moments_of(size_t places, size_t lines)
 {
-    lb_line_moments m = {places, lines, (int64_t *)claim(places, sizeof(int64_t)), NULL, NULL, NULL};
+    lb_line_moments m = {places, lines, (int64_t *)claim(places, sizeof(int64_t)), NULL, NULL, NULL, NULL};
     m.means = reals(LB_LINE_MEANS * places * lines);
     m.scatter = reals(LB_LINE_SCATTER * places * lines);
-    m.moment = reals(3 * places);
+    m.change = reals(LB_LINE_CHANGES * places * lines);
+    m.moment = reals(LB_LINE_PLACE * places);
     return m;
 }
 
@@ -66,13 +67,14 @@ static void release_moments(lb_line_moments *m)
     free(m->count);
     free(m->means);
     free(m->scatter);
+    free(m->change);
     free(m->moment);
 }
 
 static lb_line_rows rows_of(size_t rows, size_t lines)
 {
     const size_t n = rows * lines;
-    const lb_line_rows out = {reals(2 * n), reals(n), reals(n),    reals(n),        reals(2 * n),
+    const lb_line_rows out = {reals(2 * n), reals(n), reals(n),    reals(n),        reals(2 * n), reals(n),
                               reals(n),     flags(n), reals(rows), reals(3 * rows), flags(rows)};
     return out;
 }
@@ -80,9 +82,9 @@ static lb_line_rows rows_of(size_t rows, size_t lines)
 static uint64_t hash_of_rows(uint64_t hash, const lb_line_rows *out, size_t rows, size_t lines)
 {
     const size_t n = rows * lines;
-    const double *parts[] = {out->value,  out->sigma,      out->coherence, out->input_coherence,
-                             out->weight, out->distortion, out->dof,       out->moment};
-    const size_t counts[] = {2 * n, n, n, n, 2 * n, n, rows, 3 * rows};
+    const double *parts[] = {out->value,      out->sigma,     out->coherence, out->input_coherence, out->weight,
+                             out->distortion, out->variation, out->dof,       out->moment};
+    const size_t counts[] = {2 * n, n, n, n, 2 * n, n, n, rows, 3 * rows};
     for (size_t i = 0; i < sizeof counts / sizeof *counts; ++i) {
         hash = hashed(hash, parts[i], counts[i]);
     }
@@ -103,6 +105,7 @@ static void release_rows(lb_line_rows *out)
     free(out->input_coherence);
     free(out->weight);
     free(out->distortion);
+    free(out->variation);
     free(out->valid);
     free(out->dof);
     free(out->moment);
@@ -113,12 +116,14 @@ static uint64_t hash_of_moments(uint64_t hash, const lb_line_moments *m)
 {
     hash = hashed(hash, m->means, LB_LINE_MEANS * m->places * m->lines);
     hash = hashed(hash, m->scatter, LB_LINE_SCATTER * m->places * m->lines);
-    return hashed(hash, m->moment, 3 * m->places);
+    hash = hashed(hash, m->change, LB_LINE_CHANGES * m->places * m->lines);
+    return hashed(hash, m->moment, LB_LINE_PLACE * m->places);
 }
 
-static const double table[3 * WEIGHTS] = {0, 1, 1.5,   1.75,     1.875,       1.9375,
-                                          0, 1, 1.25,  1.3125,   1.328125,    1.33203125,
-                                          0, 1, 1.125, 1.140625, 1.142578125, 1.142822265625};
+static const double table[LB_LINE_SUMS * WEIGHTS] = {
+    0, 1, 1.5,   1.75,     1.875,       1.9375,         0, 1, 1.25, 1.3125, 1.328125, 1.33203125,
+    0, 1, 1.125, 1.140625, 1.142578125, 1.142822265625, 0, 0, 0.5,  1.0,    1.375,    1.625,
+    0, 0, 0.375, 0.875,    1.375,       1.75,           0, 0, 0.25, 0.5,    0.75,     0.875};
 
 /* The window `row` of several. Its moment is a column, which is not contiguous. */
 static void take_one(const lb_line_windows *in, size_t lines, size_t row, double *moment, lb_line_windows *one)

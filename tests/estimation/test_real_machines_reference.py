@@ -48,8 +48,8 @@ def test_motorbench_bounds_hold_the_period_left_out() -> None:
     hits = np.array([_within(left_out, steady) for left_out in steady])
     within = hits.mean(axis=(0, 2))
     print(f"of {hits.shape[0]} periods left out: {within[0]:.3f} within 1 sigma, {within[1]:.3f} within 2")
-    assert within[0] == pytest.approx(0.63, abs=0.03)
-    assert within[1] >= 0.95
+    assert 0.6 <= within[0] <= 0.7
+    assert 0.96 <= within[1] <= 0.995
 
 
 def _within(left_out: int, steady: np.ndarray) -> list[np.ndarray]:

@@ -9,10 +9,12 @@ from hypothesis import strategies as st
 
 from livebode.estimation.periods import weights_of
 from livebode.kernel import (
+    CHANGES,
     MEANS,
     NOISE_LARGER,
     NOISE_MOVING,
     NOISE_SCATTER,
+    PLACE,
     SCATTER,
     LineMoments,
     LineSettings,
@@ -59,7 +61,8 @@ class Case:
             np.zeros(self.places, np.int64),
             np.zeros((MEANS, self.places, self.lines)),
             np.zeros((SCATTER, self.places, self.lines)),
-            np.zeros((3, self.places)),
+            np.zeros((CHANGES, self.places, self.lines)),
+            np.zeros((PLACE, self.places)),
         )
 
 

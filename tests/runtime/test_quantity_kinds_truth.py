@@ -27,7 +27,7 @@ from tests.support.command import LINES, signals, write_csv, write_parquet
 from tests.support.errors import refused
 
 LOOP = LoopSection(velocity=PIDSection(gain=0.2308, integral_time_s=0.2, rate_hz=4000.0))
-NUMBERS = ("value", "sigma", "dof", "coherence", "valid", "distortion")
+NUMBERS = ("value", "sigma", "dof", "coherence", "valid", "distortion", "variation")
 
 
 @cache

@@ -16,7 +16,7 @@ UNITS = ("", "rad/s/A", "µm/(N m)", 'a,b "c"')
 
 def as_recorded(responses: Responses) -> Responses:
     """The responses as the run of a recording has them: what describes their accuracy has 7 digits."""
-    names = "sigma", "coherence", "input_coherence", "distortion"
+    names = "sigma", "coherence", "input_coherence", "distortion", "variation"
     rounded = {name: getattr(responses, name).astype(np.float32).astype(np.float64) for name in names}
     return replace(responses, **rounded, weight=responses.weight.astype(np.complex64).astype(np.complex128))
 

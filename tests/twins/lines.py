@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from livebode.kernel import (
+    CHANGES,
     MEANS,
     NOISE_LARGER,
     NOISE_SCATTER,
@@ -33,6 +34,9 @@ Integers = npt.NDArray[np.int64]
 
 _EXCITED = 1e-12  # of the largest power so far: above the rounding of the DFT, below any intended excitation
 _NOISE = 8  # of the means: the power of the noise at detection lines
+_LOG_RARE, _LOG_USUAL = 9.210340371976184, 1.3862943611198906  # of 10,000 and 4
+_LINEAR, _ERRATIC = 0.09989410140273, 1.3
+_TRENDS, _SCATTERS = 3, 4  # of the moments of a place: lines with a trend, and with more scatter than steps
 _Part = tuple[slice, slice, bool]
 
 
@@ -74,8 +78,8 @@ def process_newest(
             own.limits[:] = np.where(most > 0, factor * most, np.inf)
     if not found:
         lines = len(columns)
-        empty = [np.zeros((0, lines))] * 6 + [np.zeros((0, lines), np.bool_), np.zeros(0), np.zeros((3, 0))]
-        return LineRows(*empty, np.zeros(0, np.bool_)), largest, taken
+        empty = [np.zeros((0, lines))] * 7 + [np.zeros((0, lines), np.bool_), np.zeros(0), np.zeros((3, 0))]
+        return LineRows._make([*empty, np.zeros(0, np.bool_)]), largest, taken
     joined = LineRows(*map(np.concatenate, zip(*found)))
     return joined._replace(moment=joined.moment.T), largest, taken
 
@@ -96,7 +100,7 @@ def add_windows(
     """
     with np.errstate(all="ignore"):
         new = _parts_of(spectra, powers)
-        _, after, means, scatter = _add(moments, forgetting, weights, place, new, used, own=True)
+        _, after, means, scatter, _ = _add(moments, forgetting, weights, place, new, used, own=True)
     return MomentRows(after, means, scatter)
 
 
@@ -115,12 +119,16 @@ def _process(s: LineSettings, moments: LineMoments, w: LineWindows) -> tuple[Lin
     powers = np.stack([power, _power(output), noise, _power(denominator)])
     # `new` receives the noise of the mean where a window has none, after its own is used.
     new = _parts_of(np.concatenate([pair, reference[np.newaxis]]), powers)
-    before, after, means, scatter = _add(moments, s.forgetting, s.weights, w.place, new, usable, own=s.averages)
+    added = _add(moments, s.forgetting, s.weights, w.place, new, usable, own=s.averages)
+    before, after, means, scatter, deviation = added
     count = after if s.averages else before
     sums = WeightSums.after(count, s.forgetting, s.weights)
     moment = _take_moment(moments, s, w, after, usable) if s.averages else w.moment.copy()
 
-    value, variance = _estimate(s, sums, means, scatter, pair, noise, moving)
+    ratio, _ = _ratio(means)
+    changes = _take_changes(moments, s, w.place, ratio, deviation, (before, after), usable)
+    scatter_noise, changed = _divided_scatter(moments, s, w.place, _unexplained(ratio, scatter), changes, count, usable)
+    value, variance, variation = _estimate(s, sums, means, pair, (scatter_noise, changed), noise, moving)
     dof = _dof(s, sums, moving)
     seen = w.whole if s.averages else w.clean  # an average continues through windows that it excludes
     valid = seen[:, np.newaxis] & excited & np.isfinite(value)
@@ -145,6 +153,7 @@ def _process(s: LineSettings, moments: LineMoments, w: LineWindows) -> tuple[Lin
         of_input,
         np.where(valid, weight, nothing),
         distortion,
+        np.sqrt(np.where(valid, variation, np.nan)),
         valid,
         dof,
         moment,
@@ -172,27 +181,139 @@ def _quotient(numerator: Complex, denominator: Complex) -> tuple[Complex, Floats
     return quotient, inverse
 
 
-def _estimate(
-    s: LineSettings, sums: WeightSums, means: Floats, scatter: Floats, pair: Complex, noise: Floats, moving: Flags
-) -> tuple[Complex, Floats]:
-    """Value and its variance, shape (rows, lines)."""
+def _ratio(means: Floats) -> tuple[Complex, Floats]:
+    """Value of the means, and 1/|denominator|²."""
     of_means = np.empty((2, *means.shape[1:]), dtype=np.complex128)
     of_means.real, of_means.imag = means[0:4:2], means[1:4:2]
-    ratio, inverse = _quotient(*of_means)
+    return _quotient(*of_means)
+
+
+def _unexplained(ratio: Complex, scatter: Floats) -> Floats:
+    """Scatter of numerator − ratio·denominator over the periods."""
     # Feedback carries noise into both; the difference contains only what the plant does not explain.
     shared = ratio.real * scatter[2] + ratio.imag * scatter[3]
     total = scatter[0] - 2 * shared + _power(ratio) * scatter[1]
-    variance = np.maximum(total, 0.0) * (1 / sums.unbiased)[:, np.newaxis]  # rounding can make it negative
+    return np.asarray(np.maximum(total, 0.0))  # rounding can make it negative
+
+
+def _take_changes(
+    moments: LineMoments,
+    s: LineSettings,
+    place: int,
+    ratio: Complex,
+    deviation: Floats,
+    counts: tuple[Integers, Integers],
+    usable: Flags,
+) -> Floats:
+    """Changes with each window, or without it where values are those of single windows, shape (5, rows, lines)."""
+    before, after = (WeightSums.after(count, s.forgetting, s.weights) for count in counts)
+    share = 1 / after.one
+    turn = np.where(counts[0] > 0, (1 - share) * (1 + before.ages / before.one), 0.0)
+    kept = np.empty((CHANGES, *ratio.shape))
+    for row, is_used in enumerate(usable):
+        state = moments.change[:, (place + row) % moments.windows.size]
+        if not s.averages:
+            kept[:, row] = state
+        if is_used:
+            of, (re, im, den_re, den_im) = ratio[row], deviation[:4, row]
+            now = np.stack([re - (of.real * den_re - of.imag * den_im), im - (of.real * den_im + of.imag * den_re)])
+            now = np.where(np.isfinite(now), now, 0.0)
+            step = now - state[3:]
+            squares = step * step
+            state[0] = state[0] * s.forgetting + (squares[0] + squares[1])
+            state[1:3] = state[1:3] * s.forgetting + now * turn[row]
+            state[3:] = now * (1 - share[row])
+        if s.averages:
+            kept[:, row] = state
+    return kept
+
+
+def _divided_scatter(
+    moments: LineMoments,
+    s: LineSettings,
+    place: int,
+    total: Floats,
+    changes: Floats,
+    count: Integers,
+    usable: Flags,
+) -> tuple[Floats, Floats]:
+    """Noise of one window, and the variance of the response about what the value is of, shape (rows, lines).
+
+    A trend is tested as a regression is; what else is slower than a period has more scatter than steps.
+    """
+    w = WeightSums.after(count, s.forgetting, s.weights)
+    dof = w.dof - 1
+    known = dof >= 2
+    slope, periods = 1 / w.spread, w.one * w.one / w.two
+    share = np.where(known, 1 / (w.unbiased - w.spread_two * slope), np.nan)[:, np.newaxis]
+    steps_of = 0.5 / WeightSums.after(np.maximum(count - 1, 0), s.forgetting, s.weights).one
+    steps = changes[0] * np.where(known, steps_of, np.nan)[:, np.newaxis]
+    trend = changes[1] * changes[1] + changes[2] * changes[2]
+    rest = np.maximum(0.0, total - trend * slope[:, np.newaxis]) * share
+    every = total * (1 / w.unbiased)[:, np.newaxis]
+    own = trend > rest * (w.spread_two * _exceeded(_LOG_RARE, dof))[:, np.newaxis]
+    trending = np.count_nonzero(trend > rest * (w.spread_two * _exceeded(_LOG_USUAL, dof))[:, np.newaxis], axis=1)
+    varying = np.count_nonzero(every > steps, axis=1)
+    trends, varies = _judged_changes(moments, place, trending, varying, usable)
+    slower = rest > np.where(varies[:, np.newaxis], steps, steps * 2.5)
+    trends = np.where(trends[:, np.newaxis], ~np.isnan(rest), own | slower)
+    linear_of = _LINEAR * slope * slope * (periods * periods if s.averages else 1.0)
+    linear = np.maximum(0.0, trend - rest * w.spread_two[:, np.newaxis]) * linear_of[:, np.newaxis]
+    noise = np.where(slower, steps, np.where(trends, rest, every))
+    variation = np.where(trends, linear, np.where(np.isnan(rest), rest, 0.0))
+    more = np.where(slower, (rest - steps) * (_ERRATIC if s.averages else 0.0), 0.0)
+    return noise, variation + more
+
+
+def _judged_changes(
+    moments: LineMoments, place: int, trending: Integers, varying: Integers, usable: Flags
+) -> tuple[Flags, Flags]:
+    """Whether more lines than chance explains had a trend, or more scatter than steps, in the window before."""
+    lines = float(moments.means.shape[2])
+    trends, varies = np.zeros(usable.size, np.bool_), np.zeros(usable.size, np.bool_)
+    for row, is_used in enumerate(usable):
+        of_place = moments.moment[:, (place + row) % moments.windows.size]
+        excess, more = 4 * of_place[_TRENDS] - lines, 2 * of_place[_SCATTERS] - lines
+        varies[row] = more > 0.3 * lines and more * more > 6.25 * lines
+        trends[row] = varies[row] or (excess > 0.6 * lines and excess * excess > 18.75 * lines)
+        if is_used:
+            of_place[_TRENDS], of_place[_SCATTERS] = trending[row], varying[row]
+    return trends, varies
+
+
+def _exceeded(log: float, dof: Floats) -> Floats:
+    """d·(exp(log/d) − 1): what F(2, 2d) exceeds with the probability exp(−log), as (1 + x/64)^64 by squares."""
+    power = 1 + log / (64 * dof)
+    for _ in range(6):
+        power = power * power
+    return np.asarray(dof * (power - 1))
+
+
+def _estimate(
+    s: LineSettings,
+    sums: WeightSums,
+    means: Floats,
+    pair: Complex,
+    parts: tuple[Floats, Floats],
+    noise: Floats,
+    moving: Flags,
+) -> tuple[Complex, Floats, Floats]:
+    """Value, its variance, and the part of that from changes, shape (rows, lines)."""
+    ratio, inverse = _ratio(means)
+    variance, variation = parts
     if s.noise != NOISE_SCATTER:
         beside = means[_NOISE] if s.averages else noise
         if s.noise == NOISE_LARGER:
             variance = np.fmax(variance, np.where(np.isfinite(variance), means[_NOISE], beside))
         # Where the machine moves, the scatter between periods contains the motion.
         variance = np.where(moving[:, np.newaxis], beside, variance)
+    value = ratio
     if s.averages:
-        return ratio, variance * sums.of_mean[:, np.newaxis] * inverse
-    value, inverse = _quotient(*pair)
-    return value, variance * inverse
+        variance = variance * sums.of_mean[:, np.newaxis]
+    else:
+        value, inverse = _quotient(*pair)
+    variation = np.where(moving[:, np.newaxis], np.nan, variation * inverse)
+    return value, variance * inverse + np.where(np.isnan(variation), 0.0, variation), variation
 
 
 def _dof(s: LineSettings, sums: WeightSums, moving: Flags) -> Floats:
@@ -246,8 +367,8 @@ def _parts_of(spectra: Complex, powers: Floats) -> Floats:
 
 def _add(
     moments: LineMoments, forgetting: float, weights: Floats, place: int, new: Floats, usable: Flags, *, own: bool
-) -> tuple[Integers, Integers, Floats, Floats]:
-    """Counts without and with each window; means and scatter with it (`own`), or without it."""
+) -> tuple[Integers, Integers, Floats, Floats, Floats]:
+    """Counts without and with each window; means and scatter with it (`own`), or without it; deviations of each."""
     parts = _parts(place, moments.windows.size, usable)
     before, after = np.empty(usable.size, dtype=np.int64), np.empty(usable.size, dtype=np.int64)
     for places, at, used in parts:
@@ -257,7 +378,7 @@ def _add(
     share = 1 / WeightSums.after(after, forgetting, weights).one
     means, deviation = _take_means(moments.means, parts, new, share, own=own)
     products = _products(deviation) * (1 - share)[:, np.newaxis]
-    return before, after, means, _take_scatter(moments.scatter, parts, products, forgetting, own=own)
+    return before, after, means, _take_scatter(moments.scatter, parts, products, forgetting, own=own), deviation
 
 
 def _parts(place: int, places: int, usable: Flags) -> list[_Part]:
@@ -321,7 +442,7 @@ def _take_moment(moments: LineMoments, s: LineSettings, w: LineWindows, after: I
     kept = w.moment.copy()
     share = 1 / WeightSums.after(after, s.forgetting, s.weights).one
     for places, at, used in _parts(w.place, moments.windows.size, usable):
-        mean = moments.moment[:, places]
+        mean = moments.moment[:3, places]
         if used:
             mean[2] = np.where(share[at] < 1, mean[2], w.moment[2, at])
             mean[:2] += (w.moment[:2, at] - mean[:2]) * share[at]

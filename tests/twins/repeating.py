@@ -118,7 +118,7 @@ class _Twin:
         s, weights = self._state, weights_of(1.0)
         powers = np.zeros((4, 1, three.shape[1]))
         powers[:2, 0] = power(three[2]), power(three[0])
-        moments = LineMoments(s.windows, s.means, s.scatter, np.zeros((3, 1)))
+        moments = LineMoments(s.windows, s.means, s.scatter, np.zeros(0), np.zeros((3, 1)))
         yes = np.ones(1, dtype=np.bool_)
         found = add_windows(moments, 1.0, weights.table, 0, three[:, np.newaxis], powers, yes)
         return Moments(found.means, found.scatter, weights.after(found.windows))

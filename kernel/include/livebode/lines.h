@@ -19,12 +19,15 @@ extern "C" {
 
 #define LB_LINE_MEANS 10u
 #define LB_LINE_SCATTER 4u
+#define LB_LINE_CHANGES 5u
+#define LB_LINE_SUMS 6u
+#define LB_LINE_PLACE 5u
 
-/* Sums of the forgetting weights over c windows, c = 0 … length − 1, the last ones for more: Σλ^i, Σλ^2i, Σλ^3i for
- * i < c. All three are c itself where λ = 1; then there is no table. */
+/* Sums of the forgetting weights over c windows, c = 0 … length − 1, the last ones for more: Σλ^i, Σλ^2i, Σλ^3i, Σiλ^i,
+ * Σλ^i(i − μ)², Σλ^2i(i − μ)² for i < c, with μ = Σiλ^i/Σλ^i the mean age. Where λ = 1 there is no table. */
 typedef struct {
     double forgetting;   /* λ per period, 0 < λ ≤ 1 */
-    const double *table; /* [3][length] */
+    const double *table; /* [LB_LINE_SUMS][length] */
     size_t length;
 } lb_line_weights;
 
@@ -35,7 +38,11 @@ typedef struct {
     double *means;   /* [LB_LINE_MEANS][places][lines]: re and im of numerator, denominator, reference; the powers of
                         reference, output, noise at detection lines, denominator's signal */
     double *scatter; /* [LB_LINE_SCATTER][places][lines]: Σλ^i·|δnum|², |δden|², re and im of δnum·conj(δden) */
-    double *moment;  /* [3][places]: means of time and schedule, number of the oldest sample; updated with averages */
+    double *change;  /* [LB_LINE_CHANGES][places][lines], of the error numerator − Ĝ·denominator of a window:
+                        Σλ^i·|step|² of the steps from one period to the next, re and im of Σλ^i(μ − i)·error, re and im
+                        of the newest error */
+    double *moment;  /* [LB_LINE_PLACE][places]: means of time and schedule, number of the oldest sample, all updated
+                        with averages; lines with a trend, and with more scatter than steps, in the newest window */
 } lb_line_moments;
 
 /* Where the variance of numerator − Ĝ·denominator is from. */
@@ -79,6 +86,7 @@ typedef struct {
     double *input_coherence; /* [rows][lines], of reference and denominator; NaN for `direct` */
     double *weight;          /* [rows][lines][2], of the row in a mean */
     double *distortion;      /* [rows][lines] */
+    double *variation;       /* [rows][lines], part of sigma from a change of the machine */
     uint8_t *valid;          /* [rows][lines] */
     double *dof;             /* [rows] */
     double *moment;          /* [3][rows], of what the value is of */

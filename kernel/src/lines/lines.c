@@ -9,7 +9,7 @@ static int is_missing(const lb_line_windows *in, const lb_line_rows *out)
     const int inputs = in->output && in->denominator && in->reference && in->whole && in->clean && in->moment;
     const int errors = in->distortion ? in->verdict != 0 : !in->invalid;
     const int outputs = out->value && out->sigma && out->coherence && out->input_coherence && out->weight &&
-                        out->distortion && out->valid && out->dof && out->moment && out->usable;
+                        out->distortion && out->variation && out->valid && out->dof && out->moment && out->usable;
     return in->rows && !(inputs && errors && outputs);
 }
 
@@ -28,7 +28,7 @@ lb_status lb_lines_process(const lb_line_weights *weights, const lb_line_moments
     if (!weights || !moments || !largest || !settings || !in || !out || is_missing(in, out)) {
         return LB_ERROR_NULL;
     }
-    if (!moments->count || !moments->means || !moments->scatter || !moments->moment) {
+    if (!moments->count || !moments->means || !moments->scatter || !moments->change || !moments->moment) {
         return LB_ERROR_NULL;
     }
     if (in->place >= moments->places || !moments->lines || in->stride < moments->lines || has_unknown_verdict(in) ||

@@ -10,6 +10,8 @@
 enum { NUM_RE, NUM_IM, DEN_RE, DEN_IM, REF_RE, REF_IM, REF_POWER, OUT_POWER, NOISE_POWER, DEN_POWER };
 /* Order of the scatter. */
 enum { NUM_SCATTER, DEN_SCATTER, SHARED_RE, SHARED_IM };
+/* Order of the changes. */
+enum { STEPS, TREND_RE, TREND_IM, NEWEST_RE, NEWEST_IM };
 
 /* Some lines of a window, and of the moments of its place, as they are in registers. */
 typedef struct {
@@ -18,10 +20,14 @@ typedef struct {
 typedef struct {
     lb_lanes mean[LB_LINE_MEANS], scatter[LB_LINE_SCATTER];
 } lb_some_moments;
-
-/* Sums of weights: Σλ^i, Σλ^2i, Σλ^3i. */
+/* Deviations of a window from the means before it: re and im of numerator and denominator. */
 typedef struct {
-    double one, two, three;
+    lb_lanes of[4];
+} lb_deviation;
+
+/* Sums of weights: Σλ^i, Σλ^2i, Σλ^3i, Σiλ^i, and Σλ^i(i − μ)², Σλ^2i(i − μ)². */
+typedef struct {
+    double one, two, three, ages, spread, spread_two;
 } lb_weight_sums;
 
 static inline int lb_is_finite(double x) { return x - x == 0.0; }
@@ -34,12 +40,16 @@ static inline double lb_fmin(double a, double b) { return a <= b || b != b ? a :
 static inline lb_weight_sums lb_sums_of(const lb_line_weights *w, int64_t count)
 {
     LB_ASSERT(count >= 0);
-    lb_weight_sums s = {(double)count, (double)count, (double)count};
+    const double c = (double)count, ages = 0.5 * c * (c - 1.0), spread = c * (c * c - 1.0) / 12.0;
+    lb_weight_sums s = {c, c, c, ages, spread, spread};
     if (w->forgetting != 1.0) {
         const size_t at = (uint64_t)count < w->length ? (size_t)count : w->length - 1u;
         s.one = w->table[at];
         s.two = w->table[w->length + at];
         s.three = w->table[2u * w->length + at];
+        s.ages = w->table[3u * w->length + at];
+        s.spread = w->table[4u * w->length + at];
+        s.spread_two = w->table[5u * w->length + at];
     }
     return s;
 }
@@ -84,9 +94,9 @@ LB_INLINE void lb_complete_noise(lb_lanes *mean, double share, lb_lanes *now)
     }
 }
 
-/* Adds some lines of a window to the moments of its place, by deviations (West 1979). `share` is its share of the
- * mean. */
-LB_INLINE void lb_add_window(lb_some_moments *s, double forgetting, double share, const lb_window *window)
+/* Adds some lines of a window to the moments of its place, by deviations (West 1979), which are returned. `share` is
+ * its share of the mean. */
+LB_INLINE lb_deviation lb_add_window(lb_some_moments *s, double forgetting, double share, const lb_window *window)
 {
     lb_window now = *window;
     lb_lanes deviation[LB_LINE_MEANS];
@@ -103,6 +113,7 @@ LB_INLINE void lb_add_window(lb_some_moments *s, double forgetting, double share
     for (size_t q = 0; q < LB_LINE_SCATTER; ++q) {
         s->scatter[q] = s->scatter[q] * forgetting + found[q] * kept;
     }
+    return (lb_deviation){{nr, ni, dr, di}};
 }
 
 #endif

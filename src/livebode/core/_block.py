@@ -243,7 +243,7 @@ class SourceUnit:
     unit
         The unit of the output in the source, and that of the input.
     factor
-        Of these units in one SI unit of the plant: a response, its sigma and its distortion are multiplied by it.
+        Of these units in one SI unit of the plant: a response, its sigma and the parts of this are multiplied by it.
 
     Examples
     --------
@@ -265,7 +265,7 @@ class SourceUnit:
 
     def converted(self, response: _R) -> _R:
         """A response or responses in SI units, in this unit."""
-        scaled = {name: getattr(response, name) * self.factor for name in ("value", "sigma", "distortion")}
+        scaled = {name: getattr(response, name) * self.factor for name in ("value", "sigma", "distortion", "variation")}
         return replace(response, **scaled, unit=self.unit)
 
 

@@ -24,7 +24,7 @@ PlotKind = Literal["bode", "nyquist", "nichols"]
 
 Quantity = Literal["plant", "open loop", "closed loop", "sensitivity"]
 
-PER_LINE = ("value", "sigma", "coherence", "valid", "input_coherence", "weight", "distortion")
+PER_LINE = ("value", "sigma", "coherence", "valid", "input_coherence", "weight", "distortion", "variation")
 """Attributes with one value for each line."""
 
 
@@ -42,7 +42,10 @@ class FrequencyResponse:
 
     lines: Lines
     value: NDArray[np.complex128]
+    sigma: Floats
     valid: NDArray[np.bool_]
+    distortion: Floats
+    variation: Floats
     quantity: Quantity
     unit: str
 
@@ -95,6 +98,15 @@ measured line; the nearest are 50 and 60 Hz
     def phase(self) -> Floats:
         """Phase of each value, rad, −π … π, shape (…, lines); not unwrapped."""
         return np.angle(self.value)
+
+    @property
+    def noise(self) -> Floats:
+        """Standard deviation by noise, `unit`, shape (…, lines): what remains of sigma without its known other parts.
+
+        sigma² = noise² + distortion² + variation²; a part that is not known counts as zero.
+        """
+        others = [np.where(np.isfinite(part), part, 0.0) for part in (self.distortion, self.variation)]
+        return np.asarray(np.sqrt(np.maximum(self.sigma**2 - others[0] ** 2 - others[1] ** 2, 0.0)))
 
     @property
     def magnitude_db(self) -> Floats:

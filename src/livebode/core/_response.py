@@ -77,6 +77,9 @@ class Response(FrequencyResponse):
         Error of the value from effects that repeat with the excitation but are not linear (friction, backlash, encoder
         steps), unit of `value`. `sigma` includes it; NaN where it cannot be measured, infinite at a line that is
         invalid because of such an effect (distortion, mains hum, sensor steps).
+    variation
+        Standard deviation of the response over the time that the value describes, because the machine changes
+        meanwhile, unit of `value`. `sigma` includes it; 0 where no change is significant, NaN where it is not known.
     ready
         False where the machine was not ready at a sample of the window (`signals.ready`): the response is not
         assessed. True without such a channel.
@@ -111,6 +114,7 @@ class Response(FrequencyResponse):
     input_coherence: Floats = None  # type: ignore[assignment]
     weight: NDArray[np.complex128] = None  # type: ignore[assignment]
     distortion: Floats = None  # type: ignore[assignment]
+    variation: Floats = None  # type: ignore[assignment]
     ready: bool = True
     estimator: str = ""
 
@@ -171,7 +175,7 @@ _COMMON = ("lines", "quantity", "unit", "estimator")
 
 def _fill_unknown(of: Response | Responses) -> None:
     """NaN in the shape of the value, for an attribute that the source of the responses does not supply."""
-    for name in ("input_coherence", "weight", "distortion"):
+    for name in ("input_coherence", "weight", "distortion", "variation"):
         if getattr(of, name) is None:
             kind = np.complex128 if name == "weight" else np.float64
             object.__setattr__(of, name, np.full(np.shape(of.value), np.nan, dtype=kind))
@@ -213,6 +217,7 @@ class Responses(RowArrays, FrequencyResponse, Sequence[Response]):
     input_coherence: Floats = None  # type: ignore[assignment]
     weight: NDArray[np.complex128] = None  # type: ignore[assignment]
     distortion: Floats = None  # type: ignore[assignment]
+    variation: Floats = None  # type: ignore[assignment]
     ready: NDArray[np.bool_] = None  # type: ignore[assignment]
     estimator: str = ""
 

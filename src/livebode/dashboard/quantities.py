@@ -123,6 +123,7 @@ class Quantities:
             value=value,
             sigma=responses.sigma * np.abs(slope),
             distortion=responses.distortion * np.abs(slope),
+            variation=responses.variation * np.abs(slope),
             quantity=quantity,
             unit=self.unit_of(quantity),
         )

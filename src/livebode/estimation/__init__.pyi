@@ -6,6 +6,7 @@ from livebode.estimation.hum import find_hum as find_hum
 from livebode.estimation.hum import may_disturb as may_disturb
 from livebode.estimation.implausible import PlausibleRange as PlausibleRange
 from livebode.estimation.implausible import SpikeGate as SpikeGate
+from livebode.estimation.lasting_change import LastingChange as LastingChange
 from livebode.estimation.line_stage import LineStage as LineStage
 from livebode.estimation.line_stage import plant_kinds as plant_kinds
 from livebode.estimation.line_stage import response_unit as response_unit

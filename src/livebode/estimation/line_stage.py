@@ -13,6 +13,7 @@ from livebode.arrays import Complex, Flags, Floats, Integers
 from livebode.core import Channel, Event, PlantKinds, Responses, SourceUnit, Stage, StatefulBase
 from livebode.estimation.detection import DetectionNoise, beyond
 from livebode.estimation.implausible import FACTOR, PlausibleRange
+from livebode.estimation.lasting_change import LastingChange
 from livebode.estimation.movement import Movement
 from livebode.estimation.periods import PeriodMoments
 from livebode.estimation.products import power, times
@@ -50,7 +51,7 @@ class LineStage(StatefulBase):
         The available bins; None where all are available.
     """
 
-    _stage = Stage("line-stage", 1)
+    _stage = Stage("line-stage", 2)
     _STATE = ("_moments", "_movement", "_moving", "_largest")
 
     def __init__(
@@ -77,6 +78,7 @@ class LineStage(StatefulBase):
 
             name = settings.input or ""
             self._periodicity = Periodicity(lines, self._places, name, self._events)
+        self._change = LastingChange(lines, self._events) if settings.average else None
         self._moving = 0
         self._largest = 0.0
 
@@ -91,12 +93,15 @@ class LineStage(StatefulBase):
         return LineSettings(*weighting, s.average, denominator, reference, noise, noise_dof, chosen_instruction_set())
 
     def _state(self) -> dict[str, Any]:
-        return super()._state() | ({"periodicity": self._periodicity} if self._periodicity else {})
+        parts = {"periodicity": self._periodicity, "change": self._change}
+        return super()._state() | {name: part for name, part in parts.items() if part is not None}
 
     def _load(self, state: dict[str, Any]) -> None:
         super()._load(state)
         if self._periodicity is not None and "periodicity" in state:  # older states have none
             self._periodicity.restore(state["periodicity"])
+        if self._change is not None:
+            self._change.restore(state["change"])
 
     @property
     def bins(self) -> NDArray[np.int64]:
@@ -214,6 +219,8 @@ class LineStage(StatefulBase):
             np.concatenate([centre, first[np.newaxis]]),
         )
         results, self._largest = process_lines(self._kernel_settings, self._moments.arrays, windows)
+        if self._change is not None:
+            self._look_for_change(self._change, series, signals, results.usable, centre, rows.sample)
         estimates = LineEstimates.of(results)
         if ripple is not None:
             estimates = estimates.with_ripple(ripple, power(signals[s.method.denominator][:, :lines]))
@@ -230,7 +237,7 @@ class LineStage(StatefulBase):
     @property
     def is_plain(self) -> bool:
         """Whether a response follows from the spectrum and the moments alone, so that `process_each` supports it."""
-        others = self._hann, self._detection, self._periodicity
+        others = self._hann, self._detection, self._periodicity, self._change
         return not (self._converts or self._settings.ripple or any(others))
 
     @staticmethod
@@ -283,6 +290,27 @@ class LineStage(StatefulBase):
         if len(results.dof) < len(stages):
             sample = sample[taken]
         return _as_responses(s, results, LineEstimates.of(results), sample, example._unit_of(channels)), taken
+
+    def _look_for_change(
+        self,
+        change: LastingChange,
+        series: int,
+        signals: dict[Role, Complex],
+        usable: Flags,
+        centre: Floats,
+        sample: NDArray[np.int64],
+    ) -> None:
+        """Test the windows at the first place of a period, which do not overlap."""
+        chosen = np.arange(-series % self._places, len(usable), self._places)
+        chosen = chosen[usable[chosen]]
+        if not chosen.size:
+            return
+        method, lines = self._settings.method, len(self._settings.lines)
+        output, denominator, reference = (
+            signals[role][chosen, :lines] for role in ("output", method.denominator, method.reference)
+        )
+        pair = np.stack([times(output, reference.conj()), times(denominator, reference.conj())])
+        change.process(pair, centre[0, chosen], centre[1, chosen], sample[chosen])
 
     def _detected(self, signals: dict[Role, Complex]) -> Floats | None:
         """Noise of one window by the detection lines, as a power of numerator·conj(reference); None without them."""
@@ -346,6 +374,7 @@ def _as_responses(
         input_coherence=estimates.input_coherence,
         weight=estimates.weight,
         distortion=estimates.distortion,
+        variation=estimates.variation,
     )
 
 

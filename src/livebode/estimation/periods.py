@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from livebode.arrays import Complex, Floats
 from livebode.core import Stage, StatefulBase
 from livebode.dataclass import dataclass
-from livebode.kernel import MEANS, SCATTER, LineMoments, WeightSums
+from livebode.kernel import CHANGES, MEANS, PLACE, SCATTER, LineMoments, WeightSums
 
 _TOGETHER = 1 << 15  # samples of a signal in one batch: a few of such signals, and their spectra, stay in the cache
 
@@ -133,7 +133,7 @@ class Moments:
         As those of `LineMoments`, shapes (10, rows, lines) and (4, rows, lines). Real and in one array, so that a
         period is added in one pass.
     weights
-        Σλ^i, Σλ^2i, Σλ^3i, each of shape (rows,).
+        Sums of the weights, each of shape (rows,).
     """
 
     means: Floats
@@ -186,20 +186,21 @@ class PeriodMoments(StatefulBase):
         Sums of the forgetting weights.
     """
 
-    _stage = Stage("period-moments", 1)
-    _STATE = ("_count", "_means", "_scatter", "_moment")
+    _stage = Stage("period-moments", 2)
+    _STATE = ("_count", "_means", "_scatter", "_change", "_moment")
 
     def __init__(self, places: int, lines: int, forgetting: float) -> None:
         self.weights = weights_of(forgetting)
         self._count = np.zeros(places, dtype=np.int64)
         self._means = np.zeros((MEANS, places, lines))
         self._scatter = np.zeros((SCATTER, places, lines))
-        self._moment = np.zeros((3, places))
+        self._change = np.zeros((CHANGES, places, lines))
+        self._moment = np.zeros((PLACE, places))
 
     @property
     def arrays(self) -> LineMoments:
         """The state, which the functions of the kernel change in place."""
-        return LineMoments(self._count, self._means, self._scatter, self._moment)
+        return LineMoments(self._count, self._means, self._scatter, self._change, self._moment)
 
     @property
     def now(self) -> Moments:
@@ -208,19 +209,19 @@ class PeriodMoments(StatefulBase):
 
     def forget(self) -> None:
         """Return to the state before the first window."""
-        for part in (self._count, self._means, self._scatter, self._moment):
+        for part in self.arrays:
             part[:] = 0
 
 
 class Weights:
-    """Sums of the forgetting weights over c windows: Σλ^i, Σλ^2i, Σλ^3i for i < c.
+    """Sums of the forgetting weights over c windows, i < c, as `WeightSums` has them.
 
     Attributes
     ----------
     forgetting
         λ.
     table
-        The sums over 0, 1, 2 … windows, as many as change them, shape (3, any).
+        The sums over 0, 1, 2 … windows, as many as change them, shape (6, any).
     """
 
     def __init__(self, forgetting: float) -> None:
@@ -228,7 +229,15 @@ class Weights:
         # Number of windows above which the weight of another one is below rounding.
         enough = 0 if forgetting == 1 else min(ceil(log(1e-17) / log(forgetting)), 1 << 20)
         powers = np.cumprod(np.full((3, enough), forgetting ** np.array([[1.0], [2.0], [3.0]])), axis=1)
-        self.table = np.concatenate([np.zeros((3, 1)), np.ones((3, 1)), 1 + np.cumsum(powers, axis=1)], axis=1)
+        one, two, three = np.concatenate([np.zeros((3, 1)), np.ones((3, 1)), 1 + np.cumsum(powers, axis=1)], axis=1)
+        age = np.arange(enough + 1.0)
+        ages, squares, ages_two, squares_two = (
+            np.concatenate([np.zeros(2), np.cumsum(age[1:] ** n * weights)]) for weights in powers[:2] for n in (1, 2)
+        )
+        mean_age = ages / np.maximum(one, 1.0)
+        spread = squares - mean_age * ages
+        spread_two = squares_two - 2 * mean_age * ages_two + mean_age * mean_age * two
+        self.table = np.stack([one, two, three, ages, spread, spread_two])
 
     def after(self, count: NDArray[np.int64]) -> WeightSums:
         """The sums over so many windows, shape of `count`."""

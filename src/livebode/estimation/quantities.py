@@ -65,13 +65,14 @@ class LineEstimates:
     input_coherence: Floats
     weight: Complex
     distortion: Floats
+    variation: Floats
     valid: Flags
 
     @classmethod
     def of(cls, rows: LineRows) -> LineEstimates:
         """Estimates of the kernel."""
         coherence = rows.coherence, rows.input_coherence
-        return cls(rows.value, rows.sigma, *coherence, rows.weight, rows.distortion, rows.valid)
+        return cls(rows.value, rows.sigma, *coherence, rows.weight, rows.distortion, rows.variation, rows.valid)
 
     def with_ripple(self, ripple: Floats, input_power: Floats) -> LineEstimates:
         """With the share of a ripple that is added to an input of this power."""
@@ -91,7 +92,9 @@ class LineEstimates:
             slope, weight = slope * by_plant, np.full_like(value, complex(np.nan, np.nan))
         scale, valid = np.abs(slope), self.valid & np.isfinite(value)
         distortion = np.where(valid, self.distortion * scale, np.nan)
-        return replace(self, value=value, sigma=self.sigma * scale, weight=weight, distortion=distortion).only(valid)
+        sigma, variation = self.sigma * scale, self.variation * scale
+        converted = replace(self, value=value, sigma=sigma, weight=weight, distortion=distortion, variation=variation)
+        return converted.only(valid)
 
     def without(self, against: Flags) -> LineEstimates:
         """Lines that are invalid because of an error that repeats have an infinite one."""
@@ -108,5 +111,6 @@ class LineEstimates:
             np.where(valid, self.input_coherence, np.nan),
             np.where(valid, self.weight, nothing),
             self.distortion,
+            np.where(valid, self.variation, np.nan),
             valid,
         )

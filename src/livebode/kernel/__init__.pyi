@@ -31,10 +31,12 @@ from livebode.kernel._instructions import chosen_instruction_set as chosen_instr
 from livebode.kernel._instructions import instruction_set as instruction_set
 from livebode.kernel._instructions import instruction_sets as instruction_sets
 from livebode.kernel._instructions import largest_sizes as largest_sizes
+from livebode.kernel._lines import CHANGES as CHANGES
 from livebode.kernel._lines import MEANS as MEANS
 from livebode.kernel._lines import NOISE_LARGER as NOISE_LARGER
 from livebode.kernel._lines import NOISE_MOVING as NOISE_MOVING
 from livebode.kernel._lines import NOISE_SCATTER as NOISE_SCATTER
+from livebode.kernel._lines import PLACE as PLACE
 from livebode.kernel._lines import SCATTER as SCATTER
 from livebode.kernel._lines import LineMoments as LineMoments
 from livebode.kernel._lines import LineRows as LineRows

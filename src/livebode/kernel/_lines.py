@@ -13,7 +13,7 @@ import numpy as np
 from livebode.arrays import Complex, Flags, Floats, Integers
 from livebode.kernel import _native
 
-MEANS, SCATTER = 10, 4
+MEANS, SCATTER, CHANGES, PLACE = 10, 4, 5, 5
 NOISE_SCATTER, NOISE_MOVING, NOISE_LARGER = range(3)
 """Noise from the scatter between periods; where the machine moves, from detection lines; also elsewhere, if larger."""
 
@@ -22,18 +22,23 @@ _SEVERAL = 1e-9  # Σv − Σv²/Σv is exactly 0 for one window, except for rou
 
 
 class WeightSums(NamedTuple):
-    """Σλ^i, Σλ^2i and Σλ^3i over the windows of each row, shape (rows,)."""
+    """Sums over the windows of each row, shape (rows,): Σλ^i, Σλ^2i, Σλ^3i, Σiλ^i, Σλ^i(i − μ)² and Σλ^2i(i − μ)², with
+    μ the mean age Σiλ^i/Σλ^i."""
 
     one: Floats
     two: Floats
     three: Floats
+    ages: Floats
+    spread: Floats
+    spread_two: Floats
 
     @classmethod
     def after(cls, count: Integers, forgetting: float, table: Floats) -> WeightSums:
         """Sums over so many windows, from their table (`LineSettings.weights`)."""
         if forgetting == 1:
             windows = count.astype(np.float64)
-            return cls(windows, windows, windows)
+            ages, spread = 0.5 * windows * (windows - 1.0), windows * (windows * windows - 1.0) / 12.0
+            return cls(windows, windows, windows, ages, spread, spread)
         return cls(*table[:, np.minimum(count, table.shape[1] - 1)])
 
     @property
@@ -75,13 +80,18 @@ class LineMoments(NamedTuple):
     scatter
         Σλ^i|δnum|², Σλ^i|δden|² and the real and imaginary part of Σλ^i·δnum·conj(δden) with δ the deviation from the
         mean, shape (4, places, lines).
+    change
+        Of the error e of a window, numerator − Ĝ·denominator: Σλ^i|step|² of its steps from one period to the next,
+        real and imaginary part of Σλ^i(μ − i)·e, and those of the newest e, shape (5, places, lines).
     moment
-        Means of time and schedule of the windows' centres, and the oldest sample, shape (3, places).
+        Means of time and schedule of the windows' centres, the oldest sample, and the numbers of lines with a trend and
+        with more scatter than steps in the newest window, shape (5, places).
     """
 
     windows: Integers
     means: Floats
     scatter: Floats
+    change: Floats
     moment: Floats
 
 
@@ -93,7 +103,7 @@ class LineSettings(NamedTuple):
     forgetting
         λ per period.
     weights
-        Σλ^i, Σλ^2i and Σλ^3i over 0, 1, 2 … windows, the last ones also for more, shape (3, any); ignored for λ = 1.
+        `WeightSums` over 0, 1, 2 … windows, the last ones also for more, shape (6, any); ignored for λ = 1.
     averages
         Whether a value is that of all windows so far; otherwise it is that of one, whose scatter excludes it.
     denominator, reference
@@ -205,8 +215,9 @@ class NewestWindows(NamedTuple):
 class LineRows(NamedTuple):
     """Results: shape (rows, lines), of `dof` and `usable` (rows,), of `moment` (3, rows); NaN where not known.
 
-    `sigma` is that of the value, `coherence` that of reference and output and `input_coherence` that of reference
-    and denominator (NaN where they are one signal), `usable` tells which windows entered the moments.
+    `sigma` is that of the value, `variation` the part of it from a change of the machine, `coherence` that of reference
+    and output and `input_coherence` that of reference and denominator (NaN where they are one signal), `usable` tells
+    which windows entered the moments.
     """
 
     value: Complex
@@ -215,6 +226,7 @@ class LineRows(NamedTuple):
     input_coherence: Floats
     weight: Complex
     distortion: Floats
+    variation: Floats
     valid: Flags
     dof: Floats
     moment: Floats
@@ -263,6 +275,7 @@ def _rows(rows: int, lines: int, moment: tuple[int, int]) -> LineRows:
         np.empty(shape),
         np.empty(shape),
         np.empty(shape, np.complex128),
+        np.empty(shape),
         np.empty(shape),
         np.empty(shape, np.bool_),
         np.empty(rows),

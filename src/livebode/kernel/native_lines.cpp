@@ -19,19 +19,20 @@ namespace {
 
 using namespace native;
 
-// LineMoments: windows, means, scatter, moment; and the weights of LineSettings.
+// LineMoments: windows, means, scatter, change, moment; and the weights of LineSettings.
 struct Moments {
     size_t places, lines;
-    Array count, means, scatter, moment, table;
+    Array count, means, scatter, change, moment, table;
     lb_line_weights weights;
     lb_line_moments moments;
 
     Moments(nb::tuple of, double forgetting, nb::handle sums)
         : places(length_of(of[1], 1)), lines(length_of(of[1], 2)), count(of[0], INTEGER, {places}, WRITE),
           means(of[1], REAL, {LB_LINE_MEANS, places, lines}, WRITE),
-          scatter(of[2], REAL, {LB_LINE_SCATTER, places, lines}, WRITE), moment(of[3], REAL, {3, places}, WRITE),
-          table(sums, REAL, {3, length_of(sums, 1)}), weights{forgetting, table, length_of(sums, 1)},
-          moments{places, lines, count, means, scatter, moment}
+          scatter(of[2], REAL, {LB_LINE_SCATTER, places, lines}, WRITE),
+          change(of[3], REAL, {LB_LINE_CHANGES, places, lines}, WRITE),
+          moment(of[4], REAL, {LB_LINE_PLACE, places}, WRITE), table(sums, REAL, {LB_LINE_SUMS, length_of(sums, 1)}),
+          weights{forgetting, table, length_of(sums, 1)}, moments{places, lines, count, means, scatter, change, moment}
     {
     }
 };
@@ -87,10 +88,20 @@ double process(nb::tuple settings, nb::tuple moments, nb::tuple windows, nb::tup
     const Array value(out[0], COMPLEX, {rows, lines}, WRITE), sigma(out[1], REAL, {rows, lines}, WRITE);
     const Array coherence(out[2], REAL, {rows, lines}, WRITE), of_input(out[3], REAL, {rows, lines}, WRITE);
     const Array weight(out[4], COMPLEX, {rows, lines}, WRITE), errors(out[5], REAL, {rows, lines}, WRITE);
-    const Array valid(out[6], FLAG, {rows, lines}, WRITE), dof(out[7], REAL, {rows}, WRITE);
-    const Array centre(out[8], REAL, {3, rows}, WRITE), usable(out[9], FLAG, {rows}, WRITE);
-    const lb_line_rows rows_out = {
-        value.data<double>(), sigma, coherence, of_input, weight.data<double>(), errors, valid, dof, centre, usable};
+    const Array variation(out[6], REAL, {rows, lines}, WRITE), valid(out[7], FLAG, {rows, lines}, WRITE);
+    const Array dof(out[8], REAL, {rows}, WRITE), centre(out[9], REAL, {3, rows}, WRITE);
+    const Array usable(out[10], FLAG, {rows}, WRITE);
+    const lb_line_rows rows_out = {value.data<double>(),
+                                   sigma,
+                                   coherence,
+                                   of_input,
+                                   weight.data<double>(),
+                                   errors,
+                                   variation,
+                                   valid,
+                                   dof,
+                                   centre,
+                                   usable};
     double largest = nb::cast<double>(windows[0]);
     call(rows * lines, [&] { return lb_lines_process(&m.weights, &m.moments, &largest, &set, &in, &rows_out); });
     return largest;
@@ -98,11 +109,13 @@ double process(nb::tuple settings, nb::tuple moments, nb::tuple windows, nb::tup
 
 // LineMoments of one of several stages with the same settings, places and lines.
 struct StageMoments {
-    Array count, means, scatter, moment;
+    Array count, means, scatter, change, moment;
 
     StageMoments(nb::tuple of, size_t places, size_t lines)
         : count(of[0], INTEGER, {places}, WRITE), means(of[1], REAL, {LB_LINE_MEANS, places, lines}, WRITE),
-          scatter(of[2], REAL, {LB_LINE_SCATTER, places, lines}, WRITE), moment(of[3], REAL, {3, places}, WRITE)
+          scatter(of[2], REAL, {LB_LINE_SCATTER, places, lines}, WRITE),
+          change(of[3], REAL, {LB_LINE_CHANGES, places, lines}, WRITE),
+          moment(of[4], REAL, {LB_LINE_PLACE, places}, WRITE)
     {
     }
 };
@@ -179,7 +192,7 @@ size_t process_newest(nb::tuple settings, nb::list each, nb::handle largest_so_f
     const size_t denominator = nb::cast<size_t>(settings[3]), reference = nb::cast<size_t>(settings[4]);
     if (denominator >= signals || reference >= signals || length_of(chosen[1], 0) != lines)
         throw nb::value_error("the spectra have too few signals or lines");
-    const Array table(settings[1], REAL, {3, length_of(settings[1], 1)});
+    const Array table(settings[1], REAL, {LB_LINE_SUMS, length_of(settings[1], 1)});
     const lb_line_weights weights = {nb::cast<double>(settings[0]), table, length_of(settings[1], 1)};
     const lb_line_settings set = {nb::cast<bool>(settings[2]), denominator == reference, LB_NOISE_SCATTER, 0.0, 0.0,
                                   instruction_set_of(settings)};
@@ -201,8 +214,9 @@ size_t process_newest(nb::tuple settings, nb::list each, nb::handle largest_so_f
     const Array value(out[0], COMPLEX, {machines, lines}, WRITE), sigma(out[1], REAL, {machines, lines}, WRITE);
     const Array coherence(out[2], REAL, {machines, lines}, WRITE), of_input(out[3], REAL, {machines, lines}, WRITE);
     const Array weight(out[4], COMPLEX, {machines, lines}, WRITE), errors(out[5], REAL, {machines, lines}, WRITE);
-    const Array valid(out[6], FLAG, {machines, lines}, WRITE), dof(out[7], REAL, {machines}, WRITE);
-    const Array centre(out[8], REAL, {machines, 3}, WRITE), usable(out[9], FLAG, {machines}, WRITE);
+    const Array variation(out[6], REAL, {machines, lines}, WRITE), valid(out[7], FLAG, {machines, lines}, WRITE);
+    const Array dof(out[8], REAL, {machines}, WRITE), centre(out[9], REAL, {machines, 3}, WRITE);
+    const Array usable(out[10], FLAG, {machines}, WRITE);
     const Array is_taken(taken, FLAG, {machines}, WRITE);
     std::vector<double> spectrum(2 * signals * lines), sizes(signals);
     const uint8_t yes = 1;
@@ -216,7 +230,7 @@ size_t process_newest(nb::tuple settings, nb::list each, nb::handle largest_so_f
                                           spectrum.data(), sizes.data());
             if (!is_due) continue;
             const StageMoments &past = of.moments;
-            const lb_line_moments m = {places, lines, past.count, past.means, past.scatter, past.moment};
+            const lb_line_moments m = {places, lines, past.count, past.means, past.scatter, past.change, past.moment};
             const lb_line_windows in = {static_cast<size_t>(place_of[i]),
                                         1,
                                         lines,
@@ -234,11 +248,11 @@ size_t process_newest(nb::tuple settings, nb::list each, nb::handle largest_so_f
                                         0,
                                         moment.data<double>() + 3 * i};
             const size_t to = row * lines;
-            const lb_line_rows rows = {value.data<double>() + 2 * to,   sigma.data<double>() + to,
-                                       coherence.data<double>() + to,   of_input.data<double>() + to,
-                                       weight.data<double>() + 2 * to,  errors.data<double>() + to,
-                                       valid.data<uint8_t>() + to,      dof.data<double>() + row,
-                                       centre.data<double>() + 3 * row, usable.data<uint8_t>() + row};
+            const lb_line_rows rows = {
+                value.data<double>() + 2 * to,   sigma.data<double>() + to,      coherence.data<double>() + to,
+                of_input.data<double>() + to,    weight.data<double>() + 2 * to, errors.data<double>() + to,
+                variation.data<double>() + to,   valid.data<uint8_t>() + to,     dof.data<double>() + row,
+                centre.data<double>() + 3 * row, usable.data<uint8_t>() + row};
             status = lb_lines_process(&weights, &m, largest.data<double>() + i, &set, &in, &rows);
             double *size = of.sizes, *limit = of.limits;
             for (size_t s = 0; s < signals; ++s) {

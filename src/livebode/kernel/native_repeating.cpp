@@ -131,7 +131,7 @@ nb::tuple judge_periods(const Plan &of, nb::tuple state, nb::tuple periods, nb::
     const Array told(state[10], FLAG, {kinds, lines}, WRITE);
     lb_repeating_state now = {nb::cast<double>(state[0]),
                               nb::cast<double>(state[1]),
-                              {1, bins, windows, means, scatter, nullptr},
+                              {1, bins, windows, means, scatter, nullptr, nullptr},
                               output.data<double>(),
                               silent,
                               hum,

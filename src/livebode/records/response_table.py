@@ -29,16 +29,18 @@ RESPONSE_SCHEMA = Schema.of(
     weight_im="float64",
     distortion="float64",
     ready="bool",
+    variation="float64",
 )
 """Columns: oldest and newest sample of the window, time of its centre (s), scheduling signal there, line (Hz), complex
 response, sigma with its degrees of freedom, coherence of excitation and output, validity, coherence of excitation and
-input, weight in a mean, distortion, whether the machine was ready in the whole window. NaN for missing values."""
+input, weight in a mean, distortion, whether the machine was ready in the whole window, variation. NaN for missing
+values."""
 
 RESPONSES = ColumnTable(
     RESPONSE_SCHEMA,
-    ("first", "sample", "time_s", "schedule", "frequency_hz", "dof"),
+    ("first", "sample", "time_s", "schedule", "frequency_hz", "dof", "variation"),  # which is rarely known
     # Of what describes the accuracy: a sigma from m periods is known to 1/(2·√m).
-    ("sigma", "coherence", "input_coherence", "weight_re", "weight_im", "distortion"),
+    ("sigma", "coherence", "input_coherence", "weight_re", "weight_im", "distortion", "variation"),
 )
 
 
@@ -62,8 +64,21 @@ def as_batch(responses: Responses) -> Table:
         responses.weight.imag.ravel(),
         responses.distortion.ravel(),
         np.repeat(responses.ready, lines),
+        responses.variation.ravel(),
     ]
     return Table(RESPONSE_SCHEMA, tuple(columns))
+
+
+def with_variation(table: Table) -> Table:
+    """Rows of responses, of which records from before the column `variation` lack it: it is not known there."""
+    names = table.schema.names
+    if "variation" in names or "ready" not in names:
+        return table
+    place = names.index("ready") + 1
+    fields, columns = list(table.schema), list(table.columns)
+    fields.insert(place, RESPONSE_SCHEMA.field("variation"))
+    columns.insert(place, np.full(table.num_rows, np.nan))
+    return Table(Schema(tuple(fields), table.schema.metadata), tuple(columns))
 
 
 def _widened(column: NDArray[Any]) -> NDArray[Any]:

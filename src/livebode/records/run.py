@@ -39,7 +39,7 @@ from livebode.records.matrix_run import (
 )
 from livebode.records.matrix_table import COVARIANCE_SCHEMA, MatrixShape, entry_rows, matrices
 from livebode.records.matrix_table import SCHEMA as MATRIX_SCHEMA
-from livebode.records.response_table import RESPONSE_SCHEMA, responses_in
+from livebode.records.response_table import RESPONSE_SCHEMA, responses_in, with_variation
 from livebode.records.segments import event_lines, reading
 from livebode.records.segments.damage import KIND, loses_rows
 from livebode.records.segments.json_lines import EVENTS
@@ -378,9 +378,10 @@ class RunRecord:
     ) -> Iterator[Table]:
         file = self.path / name
         try:
-            yield from reading.tables(
+            rows = reading.tables(
                 self.path, name, self.report, size_bytes_max, span_s, manifest_bytes=self._manifest_bytes
             )
+            yield from map(with_variation, rows) if name == "responses" else rows
         except LivebodeError:  # it is a ValueError
             raise
         except (OSError, ValueError, KeyError, TypeError) as error:

@@ -25,7 +25,7 @@ NAME_MAX, TEXT_MAX = 60, 200
 _INFINITE = "infinite"
 _SIZE_BYTES_MAX = 16 << 20
 _ID = re.compile(r"[0-9a-f]{8}")
-_OF_LINE = ("sigma", "coherence", "distortion")
+_OF_LINE = ("sigma", "coherence", "distortion", "variation")
 _OF_RESPONSE = ("first", "sample", "time_s", "schedule", "dof")
 T = TypeVar("T")
 

@@ -9,7 +9,7 @@ import numpy as np
 from livebode.core import Responses
 
 _STORED = {"complex128": np.complex64, "float64": np.float32}
-_ROUNDED = ("value", "weight", "sigma", "coherence", "input_coherence", "distortion", "schedule", "dof")
+_ROUNDED = ("value", "weight", "sigma", "coherence", "input_coherence", "distortion", "variation", "schedule", "dof")
 
 
 def in_stored_precision(responses: Responses) -> Responses:

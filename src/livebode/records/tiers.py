@@ -10,7 +10,7 @@ import numpy as np
 from livebode.core import Lines, Responses
 from livebode.fitting import BinnedMeans, SharedWindows, binned_means, combined
 from livebode.records.matrix_table import entry_rows
-from livebode.records.response_table import RESPONSE_SCHEMA, as_batch, responses_in
+from livebode.records.response_table import RESPONSE_SCHEMA, as_batch, responses_in, with_variation
 from livebode.records.run import RunRecord, lines_in
 from livebode.records.segments import reading
 from livebode.records.segments.manifest import TIERS, Segment
@@ -48,7 +48,7 @@ class Thinning:
 
     def tables(self, rows: Mapping[str, Table]) -> dict[str, Table]:
         """The rows of each tier for the rows of a journal; none if damage cut its responses."""
-        responses = rows.get("responses")
+        responses = None if "responses" not in rows else with_variation(rows["responses"])
         each = len(self._lines) * max(1, len(self._entries))
         if responses is None or not responses.num_rows or responses.num_rows % each:
             return {}
@@ -134,7 +134,7 @@ def _rows_of(means: BinnedMeans) -> Table:
 
 def _means_of(run: RunRecord, table: Table, bin_s: float | None) -> BinnedMeans:
     """The means in rows of a tier, or with `bin_s` those of full responses."""
-    lines, found = run.lines, run.found
+    lines, found, table = run.lines, run.found, with_variation(table)
     if run.selected is not None:
         names = RESPONSE_SCHEMA.names if bin_s is not None else TIER_SCHEMA.names
         table = entry_rows(table, *run.selected, names)

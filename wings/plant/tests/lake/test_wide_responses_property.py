@@ -21,7 +21,7 @@ from tests.support.responses import any_responses, made
 
 LINES = Lines((2, 4, 7), 400, 4000.0, quiet=(3, 5, 6))
 EXACT = ("first", "sample", "time_s", "valid", "ready")
-ROUNDED = ("value", "sigma", "dof", "coherence", "schedule", "input_coherence", "weight", "distortion")
+ROUNDED = ("value", "sigma", "dof", "coherence", "schedule", "input_coherence", "weight", "distortion", "variation")
 
 
 def found_of(responses: Responses) -> dict[str, Any]:
@@ -40,6 +40,7 @@ def complete(draw: st.DrawFn) -> Responses:
         input_coherence=np.where(given.valid, rng.random(shape), np.nan),
         weight=rng.standard_normal(shape) + 1j * 10 ** rng.uniform(-300, 300, shape),
         distortion=rng.choice([np.nan, np.inf, 0.0, 1e-9], shape),
+        variation=rng.choice([np.nan, 0.0, 1e-9], shape),
         ready=rng.random(len(given)) < 0.5,
         sample=given.sample + draw(st.sampled_from([0, (1 << 62) - 1000])),
         time_s=given.time_s + draw(st.sampled_from([0.0, 1.7e9])),

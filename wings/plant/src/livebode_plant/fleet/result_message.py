@@ -25,7 +25,7 @@ _PLACE = (("axis", pa.string()), ("run", pa.int64()), ("number", pa.int64()))
 _DIGEST_BYTES = 8
 _BITS = (
     "first", "sample", "time_s", "schedule", "dof", "ready", "valid", "value", "weight", "sigma", "coherence",
-    "input_coherence", "distortion",
+    "input_coherence", "distortion", "variation",
 )  # fmt: skip
 _WIDE = pa.schema(
     [

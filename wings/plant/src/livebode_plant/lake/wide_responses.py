@@ -20,7 +20,7 @@ from livebode.records import entry_summary, lines_in
 from livebode.tables import from_numpy, text, to_numpy
 
 _COMPLEX = {"value": ("re", "im"), "weight": ("weight_re", "weight_im")}
-_REAL = ("sigma", "coherence", "input_coherence", "distortion")
+_REAL = ("sigma", "coherence", "input_coherence", "distortion", "variation")
 _LEVEL = 3
 _COUNTED, _ROUNDED = ("first", "sample"), ("schedule", "dof")
 
@@ -112,7 +112,10 @@ def from_wide(table: pa.Table, found: Mapping[str, Any]) -> Responses:
     """
     lines = lines_in(found)
     schema = wide_schema(len(lines))
-    column = {field.name: as_numpy(table, field, lines) for field in schema}
+    column = {field.name: as_numpy(table, field, lines) for field in schema if field.name != "variation"}
+    shape = table.num_rows, len(lines)
+    stored = "variation" in table.column_names  # tables of earlier versions lack it
+    column["variation"] = as_numpy(table, schema.field("variation"), lines) if stored else np.full(shape, np.nan)
     values: dict[str, Any] = {name: column[name] for name in (*_COUNTED, "ready", "valid")}
     for name in ("time_s", *_ROUNDED, *_REAL):
         values[name] = column[name].astype(np.float64, copy=False)
