@@ -170,7 +170,7 @@ class RecordingsMean:
                 continue
             responses.append(response)
             weights.append(np.where(np.isfinite(weight), weight, 1.0))
-            spread = mean.drift.result().spread
+            spread = np.nan_to_num(mean.drift.result().variation(response.sigma))
             distortion = np.where(np.isfinite(response.distortion) & (not self.realisations), response.distortion, 0.0)
             repeated.append(spread**2 + distortion**2)
         valid = np.array([response.valid for response in responses])
