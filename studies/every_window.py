@@ -9,8 +9,9 @@ state.
 A case is *right* if at least half of its lines are valid, 90 % of these, or all but two, are within the 98 % bound of
 the mean, and their median bound is at most 50 % of the response: of 16 to 29 lines with a correct bound, three are
 beyond it in one case of 250 to 50; a bound of 50 % says nothing. It is *refused* if the run stops with an
-error that has a remedy, or at most half of the lines are valid and an event gives the reason; else it is *wrong*.
-`width` is the median bound, relative to that of the same recording without its fault.
+error that has a remedy, or at most half of the lines are valid and an event gives the reason; else it is *wrong*, in
+some cases only because the bound is too *wide*. `width` is the median bound, relative to that of the same recording
+without its fault.
 """
 
 from __future__ import annotations
@@ -210,6 +211,7 @@ class Verdict:
     valid: float = float("nan")
     within: float = float("nan")
     width: float = float("nan")
+    wide: bool = False
 
 
 def judge(case: Case, folder: Path) -> Verdict:
@@ -228,8 +230,9 @@ def judge(case: Case, folder: Path) -> Verdict:
     within = float(np.mean(error[valid] <= bound[valid]))
     wide = float(np.median(bound[valid] / np.abs(case.truth[valid])))
     beyond = np.count_nonzero(error[valid] > bound[valid])
-    right = beyond <= max(BEYOND, (1 - WITHIN) * np.count_nonzero(valid)) and wide <= WIDE
-    return Verdict("right" if right else "wrong", f"{kinds}; median bound {wide:.2g}", share, within, width)
+    covers = beyond <= max(BEYOND, (1 - WITHIN) * np.count_nonzero(valid))
+    word = "right" if covers and wide <= WIDE else "wrong"
+    return Verdict(word, f"{kinds}; median bound {wide:.2g}", share, within, width, covers and wide > WIDE)
 
 
 def _measure(case: Case, recording: Recording, folder: Path) -> tuple[list[str], Floats, Floats, np.ndarray]:
@@ -280,13 +283,15 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--list", action="store_true", help="print each case")
     given = parser.parse_args(arguments)
     found = measure(given.kinds.split(","), given.cases, given.seed, given.list)
-    print("| kind | cases | right | refused | wrong | within the 98 % bound | width |\n|---|---|---|---|---|---|---|")
+    print("| kind | cases | right | refused | wrong | of these wide | within the 98 % bound | width |")
+    print("|---|---|---|---|---|---|---|---|")
     for kind, verdicts in [*found.items(), ("all", [one for some in found.values() for one in some])]:
         counts = [sum(verdict.word == word for verdict in verdicts) for word in ("right", "refused", "wrong")]
+        wide = sum(verdict.wide for verdict in verdicts)
         within, width = (np.array([getattr(one, name) for one in verdicts]) for name in ("within", "width"))
         judged = np.isfinite(within)
         shown = f"{within[judged].mean():.1%} | {np.median(width[judged]):.2f}" if judged.any() else "– | –"
-        print(f"| {kind} | {len(verdicts)} | {counts[0]} | {counts[1]} | {counts[2]} | {shown} |")
+        print(f"| {kind} | {len(verdicts)} | {counts[0]} | {counts[1]} | {counts[2]} | {wide} | {shown} |")
     return 0
 
 

@@ -87,3 +87,11 @@ def test_an_angle_that_wraps_is_unwrapped_with_the_defaults_and_by_the_configura
     livebode("run", wrap, *ROLES, "--no-unwrap", "--accept-roles",
              "--out", tmp_path / "kept")  # fmt: skip
     assert "unwrapped" not in kinds(tmp_path / "kept")
+
+
+def test_inspect_shows_what_wraps_and_what_drifts(recorded: tuple[Path, Path]) -> None:
+    creep, wrap = recorded
+    shown = livebode("inspect", creep, "--excitation", "torque", "--output", "angle").out
+    assert "'angle' drifts by 0.05 rad from window to window" in shown
+    assert "wraps at" not in shown
+    assert "'angle' wraps at 6.28318531 rad" in livebode("inspect", wrap).out

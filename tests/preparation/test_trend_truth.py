@@ -81,6 +81,27 @@ def test_white_noise_at_a_line_grows_by_less_than_stated(line: int, share: float
     assert 7 * mean / period <= 1.1  # of seven, and only by its ends
 
 
+@given(st.integers(3, 12), st.floats(0.05, 0.4), st.floats(0, 6), st.integers(0, 2**32 - 1))
+@settings(max_examples=25, deadline=None)
+def test_a_wander_below_the_lowest_line_vanishes_and_lines_remain(
+    lowest: int, part: float, phase: float, seed: int
+) -> None:
+    period, periods = 120, 16
+    spectrum = np.zeros(period // 2 + 1, dtype=np.complex128)
+    rng = np.random.default_rng(seed)
+    spectrum[lowest:30] = rng.standard_normal(30 - lowest) + 1j * rng.standard_normal(30 - lowest)
+    repeats = np.tile(np.fft.irfft(spectrum, period), periods)
+    wander = np.sin(2 * np.pi * part * min(lowest, 8) * np.arange(repeats.size) / period + phase)
+    x = repeats + 10 * wander
+    rest = x - slow_part(x, period, lowest)
+    lines = np.fft.rfft((rest - repeats).reshape(periods, period), axis=1)[:, lowest:30]
+    leak = np.fft.rfft(10 * wander.reshape(periods, period), axis=1)[:, lowest:30]
+    inner = slice(2, -2)  # what begins before the signal is not known: the ends
+    assert np.abs(lines[inner]).max() < 0.05 * max(np.abs(leak).max(), 1.0)  # one of a period has no leak
+    # What is left is in the first and last windows, and so in the scatter.
+    assert np.abs(lines.mean(axis=0)).max() <= np.abs(lines).max() / 3
+
+
 @dataclass(frozen=True, eq=False)
 class CutLog(AlignedLog):
     """A recording in Blocks of another length."""
@@ -98,8 +119,18 @@ def test_the_trend_does_not_depend_on_how_the_samples_are_cut(length: int, tmp_p
     y = y + DRIFTS["sine"] + np.cumsum(np.random.default_rng(1).standard_normal(y.size)) / 30
     y = np.tile(y, 3) + np.repeat([0, y[-1], 2 * y[-1]], y.size)
     log = open_log(write_parquet(tmp_path / "a.parquet", {"t": np.arange(y.size) / RATE_HZ, "y": y}))
-    found = trend_of(CutLog(log, (), 0, length), ["y"], WINDOW).of(["y"], 0, y.size)[0]
+    found = trend_of(CutLog(log, (), 0, length), ["y"], LINES).of(["y"], 0, y.size)[0]
     assert np.abs(found - slow_part(y, WINDOW)).max() < 0.05 * np.std(y[:WINDOW])  # between its values it is a cubic
+
+
+def test_a_change_of_what_repeats_is_no_trend() -> None:
+    # The gain changes by a tenth over the recording: a line k loses less than 1.1/πk of the change in a period.
+    period, periods = 120, 20
+    t = np.arange(period * periods) / period
+    for line in (3, 5, 9, 20):
+        x = (1 + 0.1 * t / t[-1]) * np.cos(2 * np.pi * line * t)
+        trend = slow_part(x, period, line)[2 * period : -2 * period].reshape(-1, period)
+        assert np.abs(np.fft.rfft(trend, axis=1)[:, line]).max() < 1.1 * 0.1 / periods / (np.pi * line) * period / 2
 
 
 @pytest.mark.parametrize("name", DRIFTS)

@@ -129,6 +129,7 @@ def inspect_command(
         _show_hum(found.quiet, console)
     if found.excitation is not None:
         _show_excitation(found, console)
+    _show_slow(found, console)
     if found.unrecognised:
         console.print(f"The excitation is not recognised: {found.unrecognised}", soft_wrap=True)
     if found.estimator:
@@ -211,6 +212,18 @@ def _show_recording(found: Inspection, console: Console) -> None:
         console.print(f"  not a channel: {skipped.name} ({skipped.reason})", style="dim")
     for clock, names in log.other_clocks.items():
         console.print(f"  on the clock --time '{clock}': {', '.join(names)}", style="dim", soft_wrap=True)
+
+
+def _show_slow(found: Inspection, console: Console) -> None:
+    """Channels that wrap, and those that drift so that it matters at a line."""
+    from livebode.preparation import trend_text, wrap_text
+
+    channels = {channel.name: channel for channel in found.log.channels}
+    for name, wrap in found.wraps.items():
+        console.print(f"{wrap_text(channels[name], wrap)}: a run unwraps an output or schedule", soft_wrap=True)
+    if found.drifting:
+        about = trend_text(found.drifting, list(channels.values()))
+        console.print(f"{about}: a run subtracts this trend", soft_wrap=True)
 
 
 def _show_clocks(found: Inspection, console: Console) -> None:

@@ -207,7 +207,7 @@ class TrackingSection(ConfigurationSection):
     differenced
         Channels that are differenced before the DFT: a position that drifts. Their trend is not subtracted.
     trend
-        Whether the trend of a signal that drifts, its moving mean over a window, is subtracted before the DFT, in a
+        Whether the trend of a signal that drifts, which is slower than the lines, is subtracted before the DFT, in a
         recording. "auto": where it matters at a line, at standstill; "subtract": always; "keep": never.
     hann
         Use a Hann window, from three bins; for an axis in motion.

@@ -17,6 +17,7 @@ from livebode.excitation._quantised import quantised as quantised
 from livebode.excitation._recognise import Excitation as Excitation
 from livebode.excitation._recognise import lines_of_window as lines_of_window
 from livebode.excitation._recognise import recognise as recognise
+from livebode.excitation._slow_part import LOWEST_LINES as LOWEST_LINES
 from livebode.excitation._slow_part import slow_part as slow_part
 from livebode.excitation.blocks import cut as cut
 from livebode.excitation.blocks import spectra as spectra

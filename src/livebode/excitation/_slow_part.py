@@ -7,17 +7,36 @@ import numpy as np
 from livebode.arrays import Floats
 
 _STRAIGHT = 3  # periods below which a signal is too short to see a drift bend
+_WANDERS = 4  # periods from which on what does not repeat is told from what does
+LOWEST_LINES = 3, 8
+"""Lowest lines below which, and from which on, the filter of what does not repeat is none, or the same."""
+_BETA = 5.65  # of a Kaiser window: −60 dB
+_CUTOFF, _REACH = 0.7, 3.0  # of the lowest line; its periods on each side: from 0.4 of it to it the gain falls
 
 
-def slow_part(x: Floats, period: int) -> Floats:
-    """The drift of a signal whose samples are all known, shape of `x`.
+def slow_part(x: Floats, period: int, lowest: int = 1) -> Floats:
+    """The trend of a signal whose samples are all known, shape of `x`.
 
-    Its moving mean over a period m, centred, and that of the rest x − m. A periodic component has no part in either, so
-    that x less its drift has the same lines; an offset, a ramp and a parabola of any size vanish, and of a slow wander
-    of f per period the share that remains is less than (πf)⁴/36. White noise of a window grows by 13 % of its power at
-    line 2 and by less than 3 % at the others, that of a mean by the ends of a signal alone. At both ends, for half a
-    period, the moving mean continues as a parabola; as a straight line in a signal of less than three periods. Less
-    than one and a half show no drift, and the result is 0.
+    First its moving mean over a period m, centred, and that of the rest x − m. A periodic component has no part in
+    either; an offset, a ramp and a parabola of any size vanish, and of a slow wander of f per period the share that
+    remains is less than (πf)⁴/36. White noise of a window grows by 13 % of its power at line 2 and by less than 3 % at
+    the others, that of a mean by the ends of a signal alone. At both ends, for half a period, the moving mean continues
+    as a parabola; as a straight line in a signal of less than three periods. Less than one and a half show no drift,
+    and the result is 0.
+
+    Then, where the lowest line permits it, what does not repeat below 0.4 of it: by a low-pass filter of the rest less
+    its mean period, whose gain at the line is 10⁻³. So the mean of what repeats has no part in this either, and of its
+    changes a thousandth.
+
+    Parameters
+    ----------
+    x
+        Samples, all finite.
+    period
+        Samples of a period.
+    lowest
+        Bin of the lowest line: from 3 on, and in four periods or more, a wander that is faster than a period is part of
+        the trend.
 
     Examples
     --------
@@ -28,8 +47,31 @@ def slow_part(x: Floats, period: int) -> Floats:
     """
     if 2 * x.size < _STRAIGHT * period:
         return np.zeros(x.size)
-    first = _moving_mean(x, period)
-    return first + _moving_mean(x - first, period)
+    trend = _moving_mean(x, period)
+    trend += _moving_mean(x - trend, period)
+    least, most = LOWEST_LINES
+    if lowest >= least and x.size >= _WANDERS * period:
+        trend += _wander(x - trend, period, min(lowest, most))
+    return trend
+
+
+def _wander(x: Floats, period: int, lowest: int) -> Floats:
+    """What does not repeat, below the lowest line."""
+    count = x.size // period
+    rest = x - np.resize(x[: count * period].reshape(count, period).mean(axis=0), x.size)
+    reach = int(np.ceil(_REACH * period / lowest))
+    kernel = np.sinc(2 * _CUTOFF * lowest / period * np.arange(-reach, reach + 1)) * np.kaiser(2 * reach + 1, _BETA)
+    extended = np.concatenate([_reflected(rest[: reach + 1])[::-1], rest, _reflected(rest[: -reach - 2 : -1])])
+    size = 1 << int(np.ceil(np.log2(extended.size + kernel.size)))
+    filtered = np.fft.irfft(np.fft.rfft(extended, size) * np.fft.rfft(kernel / kernel.sum(), size), size)
+    return np.asarray(filtered[2 * reach : 2 * reach + x.size])
+
+
+def _reflected(x: Floats) -> Floats:
+    """The samples before the first one, the nearest first: odd about the straight line's value there."""
+    n = np.arange(x.size)
+    slope = ((n - n.mean()) @ x) / ((n - n.mean()) @ n)
+    return np.asarray(2 * (x.mean() - slope * n.mean()) - x[1:])
 
 
 def _moving_mean(x: Floats, period: int) -> Floats:

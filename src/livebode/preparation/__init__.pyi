@@ -50,6 +50,7 @@ from livebode.preparation.trend import drifting_channels as drifting_channels
 from livebode.preparation.trend import live_trend_message as live_trend_message
 from livebode.preparation.trend import trend_event as trend_event
 from livebode.preparation.trend import trend_of as trend_of
+from livebode.preparation.trend import trend_text as trend_text
 from livebode.preparation.uneven_plan import check_uneven as check_uneven
 from livebode.preparation.uneven_plan import clock_facts as clock_facts
 from livebode.preparation.uneven_plan import uneven_event as uneven_event

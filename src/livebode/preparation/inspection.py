@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import asdict
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, field
 from itertools import groupby
 from pathlib import Path
 from typing import Any, Literal
@@ -12,7 +12,7 @@ import numpy as np
 
 from livebode.core import Lines, LivebodeError, RecordingError, UsageError
 from livebode.dataclass import dataclass
-from livebode.estimation import nearest_hop
+from livebode.estimation import Settings, nearest_hop
 from livebode.excitation import Excitation, pattern, recognise
 from livebode.locations import Location
 from livebode.preparation._steady import EXAMINED_MIN, bounded
@@ -23,8 +23,20 @@ from livebode.preparation.nonperiodic import suits_lpm
 from livebode.preparation.part import chosen_part
 from livebode.preparation.plan import SEARCHED, beginning
 from livebode.preparation.quiet import Quiet, look_for_hum
+from livebode.preparation.trend import ChannelTrend, drifting_channels
 from livebode.preparation.uneven_plan import clock_facts
-from livebode.sources import UNEVEN, ClockGroup, Log, Recording, Skipped, UnevenLog, log_of, open_file, uneven_log_of
+from livebode.sources import (
+    UNEVEN,
+    ClockGroup,
+    Log,
+    Recording,
+    Skipped,
+    UnevenLog,
+    Wrap,
+    log_of,
+    open_file,
+    uneven_log_of,
+)
 
 StretchKind = Literal["silence", "transient", "periodic", "outlying", "differing"]
 
@@ -94,7 +106,8 @@ class Inspection:
 
     `unrecognised`: why an excitation is not recognised, because it does not repeat, or next to a silent stretch.
     `without_rate`: why the recording has no rate; the rate of `log` has no meaning then. `estimator`: the one for this
-    excitation; empty if none was examined, or none finds a response to it.
+    excitation; empty if none was examined, or none finds a response to it. `wraps`: positions, and the output, that are
+    angles or counters which wrap; `drifting`: what a run subtracts from the excitation and the output.
     """
 
     log: Log
@@ -104,6 +117,8 @@ class Inspection:
     unrecognised: str = ""
     without_rate: str = ""
     estimator: str = ""
+    wraps: Mapping[str, Wrap] = field(default_factory=dict)
+    drifting: Sequence[ChannelTrend] = ()
 
     @property
     def skipped(self) -> tuple[Skipped, ...]:
@@ -175,6 +190,10 @@ class Inspection:
             }
         if self.estimator:
             plain["estimator"] = self.estimator
+        if self.wraps:
+            plain["wraps"] = {name: asdict(wrap) for name, wrap in self.wraps.items()}
+        if self.drifting:
+            plain["drifting"] = [asdict(one) for one in self.drifting]
         if self.unrecognised:
             plain["unrecognised"] = self.unrecognised
         return plain
@@ -214,6 +233,9 @@ def inspect(
     extra = [name for name in dict.fromkeys(required) if name not in known]
     names = [channel.name for channel in log.channels] + extra
     contents = read_contents(log, names, required)
+    positions = [channel.name for channel in contents.channels if channel.kind == "position"]
+    wraps = log.search_wraps([*positions, *([output] if output is not None else [])])
+    log = log.unwrapping(wraps)
     found, quiet = None, None
     if lines is not None:
         signals = [name for name in (output, input) if name is not None]
@@ -229,7 +251,11 @@ def inspect(
                 raise
             unrecognised = str(error)
             estimator = "lpm" if error.code in _NOT_REPEATING and suits_lpm(w, log.rate_hz) else ""
-    return Inspection(log, contents, found, quiet, unrecognised, without_rate, estimator)
+    drifting: list[ChannelTrend] = []
+    if found is not None and excitation is not None and output is not None:
+        roles = Settings(lines=found.lines, estimator="direct", input=excitation, output=output)
+        drifting = drifting_channels(log, roles)
+    return Inspection(log, contents, found, quiet, unrecognised, without_rate, estimator, wraps, drifting)
 
 
 def log_with_or_without_rate(

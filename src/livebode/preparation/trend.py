@@ -8,10 +8,10 @@ from typing import NamedTuple
 import numpy as np
 
 from livebode.arrays import Complex, Flags, Floats
-from livebode.core import Block, Channel, Event
+from livebode.core import Block, Channel, Event, Lines
 from livebode.dataclass import dataclass
 from livebode.estimation import Settings, SignalTrend, TrendStretch
-from livebode.excitation import filled, slow_part, spectra
+from livebode.excitation import LOWEST_LINES, filled, slow_part, spectra
 from livebode.language import Message
 from livebode.preparation._steady import excited_bins, moves
 from livebode.preparation.aligned import AlignedLog
@@ -23,7 +23,7 @@ _OF_SIGMA = 0.2  # what creeps: part of the mean's sigma above which its 98 % bo
 _SIGNIFICANT = 3.0  # sigma of the drift itself, as noise alone shows it
 _OF_LINE = 1e-4  # of the line itself: less is none of a simulation's rounding, and of no interest
 _LARGEST = 0.1  # part of the steps between periods that a disturbance may have, and that do not count
-_PER_PERIOD = 8  # values of the trend, between which it is a cubic
+_PER_PERIOD = 8  # values of the trend in a period of its fastest part, between which it is a cubic
 _TOGETHER = 16  # periods
 _MARGIN = 2  # periods at the ends of what is computed together that depend on what is beyond it
 
@@ -175,14 +175,14 @@ def drifting_channels(log: RecordedSource, settings: Settings) -> list[ChannelTr
     return search.finish()
 
 
-def trend_of(source: AlignedLog, names: Sequence[str], window: int) -> SignalTrend:
+def trend_of(source: AlignedLog, names: Sequence[str], lines: Lines) -> SignalTrend:
     """The trend of these channels over a recording, from its first sample on."""
     stretches: list[TrendStretch] = []
     now: _Stretch | None = None
     for block in source.blocks(list(names)):
         if now is None or block.gap or block.start != now.stop:
             stretches += [] if now is None else now.finish()
-            now = _Stretch(len(names), window, block.start)
+            now = _Stretch(len(names), lines, block.start)
         now.add(block.rows(names))
     stretches += [] if now is None else now.finish()
     return SignalTrend(tuple(names), stretches)
@@ -191,10 +191,12 @@ def trend_of(source: AlignedLog, names: Sequence[str], window: int) -> SignalTre
 class _Stretch:
     """Trend of consecutive samples of some channels, from the sample `first` on, computed some periods at a time."""
 
-    def __init__(self, channels: int, window: int, first: int) -> None:
+    def __init__(self, channels: int, lines: Lines, first: int) -> None:
         self.stop = first
         self._first = self._begins = self._next = first  # of the stretch, the held rows, and the values that follow
-        self._window, self._step = window, max(1, window // _PER_PERIOD)
+        self._window, self._lowest = lines.window, lines.bins[0]
+        fastest = min(self._lowest, LOWEST_LINES[1]) if self._lowest >= LOWEST_LINES[0] else 1
+        self._step = max(1, lines.window // (_PER_PERIOD * fastest))
         self._rows, self._values = np.zeros((channels, 0)), list[Floats]()
 
     def add(self, rows: Floats) -> None:
@@ -205,7 +207,7 @@ class _Stretch:
 
     def _compute(self, stop: int) -> None:
         """Add the values before this sample, and forget the samples that no later value needs."""
-        trend = np.array([slow_part(_whole(x, self._window), self._window) for x in self._rows])
+        trend = np.array([slow_part(_whole(x, self._window), self._window, self._lowest) for x in self._rows])
         places = np.arange(self._next, stop, self._step)
         self._values.append(trend[:, places - self._begins])
         self._next += places.size * self._step
@@ -246,7 +248,7 @@ def trend_event(
     """One Event for the channels whose trend is subtracted; `straight`: a line that is fitted to each window."""
     drifts = trend_text(found, channels)
     message = Message(
-        "{drifts}: this trend, the moving mean over a window, is subtracted; --trend keep leaves it in", drifts=drifts
+        "{drifts}: this trend, which is below the lines, is subtracted; --trend keep leaves it in", drifts=drifts
     )
     if straight:
         message = Message(

@@ -136,7 +136,7 @@ class _TrackerSearches:
         drifting = self._trends.finish((source.first - self._first) // settings.lines.window)
         names = self._trends.names if self._always else [one.channel for one in drifting]
         if names:
-            tracker.know_trend(trend_of(source, names, settings.lines.window).shifted(shift))
+            tracker.know_trend(trend_of(source, names, settings.lines).shifted(shift))
             self.found["trend_subtracted"] = names
             noticed += [] if self._always else [trend_event(drifting, settings, source.channels, source.first)]
         return noticed
