@@ -13,7 +13,7 @@ _KINDS = {
     "roles-doubtful", "transient", "outlying-periods", "phase-slip", "phase-slips", "restart", "replaced",
     "computer-clock", "foreign", "backlog", "backlog-cleared", "waiting", "window-doubtful",
     "drift", "not-periodic", "distortion-levels", "best-linear-approximation", "recordings-differ",
-    "uneven-clock", "long-recording", "trend-subtracted", "signal-drifts", "suppressed",
+    "uneven-clock", "long-recording", "trend-subtracted", "spikes-subtracted", "signal-drifts", "suppressed",
     "sink-down", "sink-up", "sink-full", "sink-refused",
 }  # fmt: skip
 _ONCE = {"foreign", "suppressed"}

@@ -45,8 +45,10 @@ from livebode.estimation.tracker_settings import default_hop as default_hop
 from livebode.estimation.tracker_settings import divisors as divisors
 from livebode.estimation.tracker_settings import nearest_hop as nearest_hop
 from livebode.estimation.tracker_settings import quarter_hop as quarter_hop
+from livebode.estimation.trend import RepeatedSpikes as RepeatedSpikes
 from livebode.estimation.trend import Trend as Trend
 from livebode.estimation.trend import TrendStretch as TrendStretch
+from livebode.estimation.trend import TurningSpikes as TurningSpikes
 from livebode.estimation.uneven import UnevenSpectra as UnevenSpectra
 from livebode.estimation.uneven import UnevenTracker as UnevenTracker
 from livebode.estimation.uneven import UnevenWindow as UnevenWindow
