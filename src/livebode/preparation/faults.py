@@ -17,9 +17,15 @@ from livebode.preparation.aligned import AlignedLog
 
 _PERIODS_MIN = 4
 _RUN = 3  # equal samples in a row: fewer are by chance
-_AROUND, _PILED = 5.5, 5.0  # steps around a value, and times the samples there, where nothing holds the output
+_AROUND, _PILED, _PILED_HIGH = (
+    5.5,
+    5.0,
+    12.0,
+)  # steps around a value, and times the samples there: at a parabola's top 7
 _ABRUPT = 1.5  # step at the end of a run over that at the top of a parabola with such a run
 _LEAST, _LEAST_SHARE = 4, 0.01  # samples of a period, and of all, at zero that are no run
+_LEVELS = 0.8  # rms over peak: of a sine 0.7, of a binary sequence 1
+_LEVELS_MIN = 40  # steps in the range: of fewer, one is often that of many samples
 _IN_PERIODS = 0.6  # of the periods have such samples
 _HIGH, _OF_LINE = 7.0, 0.3  # robust standard deviations of the mean period beside the lines, and those at a line
 _SMALL = 3.5  # robust standard deviations of what is explained by spikes, beside larger ones
@@ -91,7 +97,8 @@ class FaultSearch:
         if self._settings.schedule and moves(rows[-1], window):
             return []
         output = self.names.index(self._settings.output)
-        if flat := flat_part(rows[output], window):
+        reference = rows[self.names.index(str(self._settings.channel(self._settings.method.reference)))]
+        if not _has_levels(reference) and (flat := flat_part(rows[output], window)):
             raise _flat_error(self._settings.output, flat)
         found: list[RepeatedSpikes | TurningSpikes] = []
         for name, x in zip(self.names, rows):
@@ -117,6 +124,12 @@ class FaultSearch:
         return [*found, TurningSpikes(name, samples + first, sizes)] if samples.size else found
 
 
+def _has_levels(reference: Floats) -> bool:
+    """Whether an excitation stands still at its own limits, as a binary sequence, so that the output may do so, too."""
+    centred = np.abs(reference - np.nanmedian(reference))
+    return float(np.sqrt(np.nanmean(centred**2))) > _LEVELS * float(np.nanquantile(centred, 0.999))
+
+
 def flat_part(x: Floats, window: int) -> FlatPart | None:
     """The value at which a periodic signal stands still in most of its periods, although it moves up to it.
 
@@ -139,9 +152,12 @@ def flat_part(x: Floats, window: int) -> FlatPart | None:
     beside = float(samples[(apart > 0) & (apart <= _AROUND * step)].sum()) / ((1 if limit else 2) * int(_AROUND))
     if samples[most] <= _PILED * beside or np.unique(begin[runs] // window).size < _IN_PERIODS * periods:
         return None
-    run = float(length[runs].mean()) / held
-    if run < _RUN:
-        is_flat = step > 0 and abs(value) <= step and samples[most] >= max(_LEAST * periods, _LEAST_SHARE * x.size)
+    run, many = float(length[runs].mean()) / held, samples[most] >= held * max(_LEAST * periods, _LEAST_SHARE * x.size)
+    usual = limit or abs(value) <= step  # places of a fault
+    if many and usual and np.ptp(x) > _LEVELS_MIN * step > 0 and (samples[most] > _PILED_HIGH * beside or run < _RUN):
+        is_flat = True
+    elif run < _RUN:
+        is_flat = False
     else:
         inner = np.flatnonzero(runs & (length >= _RUN * held) & (begin > 0) & (begin + length < x.size))
         ends = np.concatenate([x[begin[inner] - 1], x[begin[inner] + length[inner]]])
@@ -168,9 +184,11 @@ def repeated_spikes(blocks: Floats, excited: np.ndarray) -> tuple[Integers, Floa
     least = _OF_SIGNAL * float(typical.std())
     kernel = np.fft.irfft(free.astype(np.float64), window)
     most, places, sizes, left = min(max(_MOST, round(_SHARE_MAX * window)), _MOST_TRIED), nothing[0], nothing[1], rest
-    while np.abs(left).max() > max(_high(window) * _deviation(left), least):
-        before = places.size
-        places = np.union1d(places, _row(left, kernel))
+    while True:
+        row, size = _row(left, kernel)
+        if size <= max(_high(window) * _deviation(left), least):
+            break
+        before, places = places.size, np.union1d(places, row)
         if places.size == before or places.size > most:
             return nothing
         sizes, left = _fitted(rest, places, kernel)
@@ -178,17 +196,20 @@ def repeated_spikes(blocks: Floats, excited: np.ndarray) -> tuple[Integers, Floa
     return (places[large], _fitted(rest, places[large], kernel)[0]) if large.any() else nothing
 
 
-def _row(left: Floats, kernel: Floats) -> Integers:
-    """The row of samples that explains most of what remains: a longer one only if it explains clearly more."""
+def _row(left: Floats, kernel: Floats) -> tuple[Integers, float]:
+    """The row of samples that explains most of what remains, a longer one only if it explains clearly more; its size.
+
+    The size is the root of what it explains of the sum of squares.
+    """
     found = []
     for length in range(1, _ROW_MAX + 1):
         within = np.lib.stride_tricks.sliding_window_view(np.concatenate([left, left[: length - 1]]), length)
         alike = kernel[np.subtract.outer(np.arange(length), np.arange(length))]
-        explained = np.einsum("ij,jk,ik->i", within, np.linalg.pinv(alike), within)
-        first = int(np.argmax(explained))
-        found.append((float(explained[first]) / (1 + _LONGER * (length - 1)), first, length))
-    _, first, length = max(found)
-    return (first + np.arange(length)) % left.size
+        powers = np.einsum("ij,jk,ik->i", within, np.linalg.pinv(alike), within)
+        first = int(np.argmax(powers))
+        found.append((float(powers[first]) / (1 + _LONGER * (length - 1)), first, length))
+    explained, first, length = max(found)
+    return (first + np.arange(length)) % left.size, float(np.sqrt(max(explained, 0.0)))
 
 
 def _fitted(rest: Floats, places: Integers, kernel: Floats) -> tuple[Floats, Floats]:
