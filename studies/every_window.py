@@ -106,6 +106,39 @@ def wander(recording: Recording, rng: np.random.Generator) -> Recording:
     return _moved(recording, _size(rng, 0.03, 30) * np.sin(np.outer(2 * np.pi * t, 1 / over) + phase).sum(axis=1))
 
 
+def repeated_spike(recording: Recording, rng: np.random.Generator) -> Recording:
+    """One to three spikes of one to three samples at the same places of every period, of 0.01 to 100 swings."""
+    period = np.zeros(recording.window)
+    for place in rng.choice(recording.window, rng.integers(1, 4), replace=False):
+        size = _size(rng, 0.01, 100)
+        period[(place + np.arange(rng.integers(1, 4))) % recording.window] += size * rng.uniform(0.3, 1)
+    return _moved(recording, np.tile(period, recording.y.size // recording.window))
+
+
+def turning_spike(recording: Recording, rng: np.random.Generator) -> Recording:
+    """A spike of 0.01 to 100 swings at every turn, of 0.3 to 3 periods."""
+    turn = rng.uniform(0.3, 3) * recording.window
+    places = np.arange(rng.uniform(0, turn), recording.y.size, turn).astype(np.int64)
+    spikes = np.zeros(recording.y.size)
+    spikes[places] = _size(rng, 0.01, 100)
+    return _moved(recording, spikes)
+
+
+def saturation(recording: Recording, rng: np.random.Generator) -> Recording:
+    """An output that is cut off at 30 to 95 % of its largest value, on one side or on both."""
+    limit = rng.uniform(0.3, 0.95) * float(np.abs(recording.y).max())
+    low = -limit if rng.random() < 0.5 else -np.inf
+    return replace(recording, y=np.clip(recording.y, low, limit))
+
+
+def dead_band(recording: Recording, rng: np.random.Generator) -> Recording:
+    """Values within 0.02 to 0.7 swings that are reported as zero, or by which the others are smaller."""
+    width = abs(_size(rng, 0.02, 0.7)) * recording.swing
+    outside = np.abs(recording.y) > width
+    less = width * np.sign(recording.y) if rng.random() < 0.5 else 0.0
+    return replace(recording, y=np.where(outside, recording.y - less, 0.0))
+
+
 TURNS = {"rad": 2 * np.pi, "deg": 360.0, "rev": 1.0}
 UNNAMED_TURNS = (2 * np.pi, 360.0, 1.0, *(float(1 << bits) for bits in (8, 10, 12, 13, 16, 17, 20, 24, 32)))
 
@@ -136,6 +169,10 @@ KINDS: Mapping[str, Kind] = {
     "random walk": random_walk,
     "wander": wander,
     "wrap": wrap,
+    "repeated spike": repeated_spike,
+    "turning spike": turning_spike,
+    "saturation": saturation,
+    "dead band": dead_band,
 }
 """Faults by name; those of `wrap` change the unit of y, and of u so that the response remains that of the plant."""
 

@@ -50,7 +50,9 @@ from livebode.estimation.tracker_settings import divisors as divisors
 from livebode.estimation.tracker_settings import nearest_hop as nearest_hop
 from livebode.estimation.tracker_settings import quarter_hop as quarter_hop
 from livebode.estimation.trend import SignalTrend as SignalTrend
+from livebode.estimation.trend import RepeatedSpikes as RepeatedSpikes
 from livebode.estimation.trend import TrendStretch as TrendStretch
+from livebode.estimation.trend import TurningSpikes as TurningSpikes
 from livebode.estimation.uneven import UnevenSpectra as UnevenSpectra
 from livebode.estimation.uneven import UnevenTracker as UnevenTracker
 from livebode.estimation.uneven import UnevenWindow as UnevenWindow

@@ -18,7 +18,7 @@ from livebode.estimation.silence_search import HumSpan
 from livebode.estimation.spectra import LineSpectra
 from livebode.estimation.stream_estimator import Centre, InputStatistics, StreamEstimator, signals_of
 from livebode.estimation.tracker_settings import Settings
-from livebode.estimation.trend import SignalTrend
+from livebode.estimation.trend import RepeatedSpikes, SignalTrend, TurningSpikes
 
 NOTHING: Integers = np.zeros((0, 2), dtype=np.int64)
 """No stretch is set aside."""
@@ -105,6 +105,7 @@ class Tracker(StreamEstimator[InputStatistics]):
         self._watch = InputStatistics(self._events, window)
         self._end, self._aside = (0, 0.0), NOTHING
         self._trend: SignalTrend | None = None
+        self._sensor_spikes: Sequence[RepeatedSpikes | TurningSpikes] = ()
         self._parts = {
             "spectra": self._spectra,
             "lines": self._lines,
@@ -139,6 +140,10 @@ class Tracker(StreamEstimator[InputStatistics]):
         """The trend of a whole recording, which is subtracted from the signals; the schedule is not changed."""
         self._trend = trend
 
+    def know_sensor_spikes(self, spikes: Sequence[RepeatedSpikes | TurningSpikes]) -> None:
+        """Spikes in most of the periods of a whole recording, which are subtracted from the signals."""
+        self._sensor_spikes = spikes
+
     def leave_out(self, samples: NDArray[np.int64]) -> None:
         """Numbers of samples, ascending: no window that contains one of them counts."""
         self._spectra.left_out = samples
@@ -171,6 +176,9 @@ class Tracker(StreamEstimator[InputStatistics]):
         stop = block.stop
         if self._trend is not None:
             channels = channels - self._trend.of([s.channel(role) for role in self._roles], block.start, stop)
+        for spikes in self._sensor_spikes:
+            rows = [[s.channel(role) == spikes.channel] for role in self._roles]
+            channels = channels - np.where(rows, spikes.of(block.start, stop), 0.0)
         if self._watch.starts(block):
             self._spectra.restart(block.start)
             self._centre.restart()

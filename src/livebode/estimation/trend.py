@@ -1,4 +1,4 @@
-"""The trend that a Tracker subtracts from signals that drift, before their DFT."""
+"""Trend and repeated spikes: what a Tracker subtracts from signals before their DFT."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from livebode.arrays import Floats
+from livebode.arrays import Floats, Integers
 from livebode.dataclass import dataclass
 
 _POINTS = 4  # of a cubic
@@ -37,6 +37,65 @@ class TrendStretch:
             (t + 1) * t * (t - 1) / 6,
         )
         return np.asarray(sum(weight * v[:, place + number - 1] for number, weight in enumerate(weights)))
+
+
+@dataclass(frozen=True, eq=False)
+class RepeatedSpikes:
+    """Spikes of a channel at the same places of every period.
+
+    Attributes
+    ----------
+    channel
+        Its name.
+    places, sizes
+        Numbers of the samples modulo the window, and what is subtracted from them, shape (spikes,) each.
+    window
+        Samples of a period.
+    """
+
+    channel: str
+    places: Integers
+    sizes: Floats
+    window: int
+
+    def of(self, start: int, stop: int) -> Floats:
+        """The spikes in the samples start … stop − 1, (samples,)."""
+        period = np.zeros(self.window)
+        period[self.places] = self.sizes
+        return period[np.arange(start, stop) % self.window]
+
+    @property
+    def largest(self) -> float:
+        """Size of the largest one."""
+        return float(np.abs(self.sizes).max())
+
+    def shifted(self, samples: int) -> RepeatedSpikes:
+        """The spikes of a recording whose samples have numbers that are larger by so many."""
+        return replace(self, places=(self.places + samples) % self.window)
+
+
+@dataclass(frozen=True, eq=False)
+class TurningSpikes:
+    """Spikes of a channel at any samples: their numbers, ascending, and what is subtracted, (spikes,) each."""
+
+    channel: str
+    samples: Integers
+    sizes: Floats
+
+    def of(self, start: int, stop: int) -> Floats:
+        """The spikes in the samples start … stop − 1, (samples,)."""
+        found, some = np.zeros(stop - start), slice(*np.searchsorted(self.samples, [start, stop]))
+        found[self.samples[some] - start] = self.sizes[some]
+        return found
+
+    @property
+    def largest(self) -> float:
+        """Size of the largest one."""
+        return float(np.abs(self.sizes).max())
+
+    def shifted(self, samples: int) -> TurningSpikes:
+        """The spikes of a recording whose samples have numbers that are larger by so many."""
+        return replace(self, samples=self.samples + samples)
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,6 +21,8 @@ from livebode.preparation.configuring import suitable_model as suitable_model
 from livebode.preparation.configuring import tables_of as tables_of
 from livebode.preparation.contents import ChannelSummary as ChannelSummary
 from livebode.preparation.contents import contents_of as contents_of
+from livebode.preparation.faults import FaultSearch as FaultSearch
+from livebode.preparation.faults import spikes_event as spikes_event
 from livebode.preparation.followers import LIVE_RESPONSES_PER_S as LIVE_RESPONSES_PER_S
 from livebode.preparation.followers import follower_of as follower_of
 from livebode.preparation.followers import live_follower as live_follower

@@ -18,6 +18,7 @@ from livebode.locations import Location, local_copy
 from livebode.preparation import (
     AlignedLog,
     ChannelCheck,
+    FaultSearch,
     SilencesOfRecording,
     SteadySearch,
     TrendSearch,
@@ -29,6 +30,7 @@ from livebode.preparation import (
     roles_in_doubt,
     slip_event,
     slips_of,
+    spikes_event,
     trend_event,
     trend_of,
     window_in_doubt,
@@ -110,19 +112,20 @@ def examined(axis: Axis, log: Log, follower: Follower, shift: int = 0) -> Examin
 
 
 class _TrackerSearches:
-    """What a Tracker knows of a whole recording before it starts: hum in silences, early spikes, and trends."""
+    """What a Tracker knows of a whole recording before it starts: hum, early spikes, trends, faults of sensors."""
 
     def __init__(self, axis: Axis, settings: Settings, first: int) -> None:
         self._settings, self._first, self._always = settings, first, axis.tracking.trend == "subtract"
         self._silences = SilencesOfRecording(settings, first)
         self._trends = None if axis.tracking.trend == "keep" else TrendSearch(settings, first)
+        self._faults = FaultSearch(settings, first) if axis.motion is None else None
         self.found = dict[str, Any]()
         """Entries of run.json."""
 
     @property
     def each(self) -> list[_Search]:
         """The searches."""
-        return [self._silences, *([self._trends] if self._trends else [])]
+        return [self._silences, *(one for one in (self._trends, self._faults) if one)]
 
     def inform(self, tracker: Tracker, source: AlignedLog, shift: int) -> list[Event]:
         """Give the tracker what was found, in a recording that begins at its steady state; events about it."""
@@ -131,9 +134,14 @@ class _TrackerSearches:
         tracker.know_hum([span.shifted(shift) for span in spans])
         tracker.know_spikes(early_spikes(source, settings) + shift)
         noticed = hum_events(spans, settings.lines, source.first)
+        transient = (source.first - self._first) // settings.lines.window
+        if self._faults and (spikes := self._faults.finish(transient)):
+            tracker.know_sensor_spikes([one.shifted(shift) for one in spikes])
+            self.found["spikes_subtracted"] = [one.channel for one in spikes]
+            noticed.append(spikes_event(spikes, source, settings))
         if self._trends is None:
             return noticed
-        drifting = self._trends.finish((source.first - self._first) // settings.lines.window)
+        drifting = self._trends.finish(transient)
         names = self._trends.names if self._always else [one.channel for one in drifting]
         if names:
             tracker.know_trend(trend_of(source, names, settings.lines).shifted(shift))

@@ -19,7 +19,7 @@ _NAMES: Mapping[QuantityKind, re.Pattern[str]] = {
     "torque": re.compile(r"torque|moment(?!a)|(?<![a-z])trq(?![a-z])|转矩|扭矩|力矩"),
     "velocity": re.compile(r"speed|velocit|drehzahl|geschwindigkeit|转速|(?<!加)速度|(?<![a-z])(?:vel|omega)(?![a-z])"),
     "position": re.compile(
-        r"position|angle|winkel|位置|角度|lage(?:ist|soll)|(?:(?<![a-z])|ist|soll)lage(?![a-z])|(?<![a-z])(?:pos|theta)(?![a-z])"
+        r"position|angle|winkel|位置|角度|lage(?:ist|soll)|(?:(?<![a-z])|ist|soll)lage(?![a-z])|(?<![a-z])pos(?![a-z])"
     ),
     "force": re.compile(r"force|(?<!t)kraft|推力"),
     "current": re.compile(r"strom|电流|(?<![a-z])i_?q(?![a-z])|(?<![a-z])current$"),

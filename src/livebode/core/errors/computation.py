@@ -45,6 +45,8 @@ class SignalError(LivebodeError):
         "no-valid-response": "No response is valid at any line.",
         "not-finite": "A channel has samples that are not finite.",
         "not-periodic": "The excitation does not repeat from window to window.",
+        "output-cut-off": "The output stands still at its largest or smallest value in every period.",
+        "output-dead-band": "The output stands still between values that move, in every period.",
         "pause-too-short": "There is no stretch without excitation that is long enough to look for hum.",
         "rate-differs": "The samples have another rate than is needed.",
         "repeated": "Samples or spectra came twice.",
