@@ -17,16 +17,16 @@ from livebode.estimation.products import divided, magnitude, power, scaled, time
 _OUTSIDE = _BESIDE = 4  # detection lines outside of the lines, and of each side of a line
 _ON_BIN = 0.1  # bins: hum this close to a bin repeats with the excitation
 _LINES_BESIDE = 4  # of each side of a detection line, whose skirts are counted
-_FORGETTING = 0.8  # of one pair of periods to the next: about five pairs are remembered
+_FORGETTING = 0.9  # of one pair of periods to the next: about ten pairs are remembered
 _STEADY = 0.03  # of the travel of two periods: with a larger change from one to the other the motion itself leaks
-_SKIRTS = 2.0  # times the predicted power of the skirts: half of an amplitude is not predicted near a resonance
+_SKIRTS = 2.0  # times the mean of the two predictions: half of an amplitude is not predicted near a resonance
 _CHANCE = 2.5  # standard deviations of what noise alone repeats
 _SMOOTH = 2  # detection lines on each side that are judged together
 _COHERENT = 2.2
 """Effect on a line of typical amplitude, relative to that on the worst of the detection lines beside it.
 
 For 63 % of the lines of 100 simulated axes with reversing friction the ratio is up to 1.0, with play too 1.4, and for
-96 % up to 2.2 and 4.3 (within twice the bound): `python -m studies.motion_distortion` has the coverage.
+96 % up to 2.2 and 4.3, within twice the bound. `python -m studies.motion_distortion` prints the coverage.
 """
 _DISTORTED = 0.5  # of |G|: from where on the value is not that of a linear machine
 _PAUSED = 0.25  # of the largest power of the reference
@@ -70,8 +70,8 @@ class MovingDistortion(StatefulBase):
     The skirts repeat, too. To first order they are Σ dG_k·U_k·c(q − k) at bin q with the change dG_k of the response
     from period to period, and c the spectrum of a ramp over the window (J. Lataire, E. Louarroudi, R. Pintelon,
     "Detecting a time-varying behavior in frequency response function measurements", IEEE Trans. Instrum. Meas. 61(8),
-    2012); a resonance filters them as it filters the input, so that the smaller one of the two predictions is used.
-    What repeats beyond them is distortion.
+    2012). A resonance filters them as it filters the input, an antiresonance does not: the mean of the two predictions
+    is used. What repeats beyond twice that is distortion.
 
     Its effect on a line is taken from the worst of four detection lines on each side, as it is and divided by |Ĝ|:
     friction and play are uniform in the torque. A line that is stronger in the output than the rms of the lines
@@ -186,13 +186,13 @@ class MovingDistortion(StatefulBase):
         _average(self._power, (power(newer) + power(older)) / 2, share)
 
     def _judge(self) -> None:
-        skirts = magnitude(self._explained).min(axis=0)
+        skirts = magnitude(self._explained).mean(axis=0)
         beyond = self._repeats.real - np.abs(self._repeats.imag) - _SKIRTS * skirts
         share = np.nan_to_num(beyond / self._power)
         chance = _CHANCE * np.sqrt(self._weights[1] / 2) / self._weights[0]  # of one detection line
         smooth = _mean_beside(share)
         significant = np.maximum(_above(share, chance), _above(smooth, chance / np.sqrt(2 * _SMOOTH + 1)))
-        amplitude = significant * np.sqrt(np.fmax(beyond, 0.0))
+        amplitude = significant * np.sqrt(np.fmax(magnitude(self._repeats) - _SKIRTS * skirts, 0.0))
         plant, strength = magnitude(self._plant[1]), power(times(self._plant[1], self._input[1]))
         model = magnitude(self._interpolation.at(self._plant[1]))
         as_input = np.fmax(plant[:, np.newaxis] / model[self._near], 1.0)
@@ -200,7 +200,7 @@ class MovingDistortion(StatefulBase):
         worst = (amplitude[self._near] * as_input).max(axis=1)
         self.distortion = _COHERENT * stronger * worst / magnitude(self._input[1])
         self.share = self.distortion / plant
-        self.invalid = (self.share > _DISTORTED) & (significant[self._near].max(axis=1) > _DISTORTED)
+        self.invalid = (self.share > _DISTORTED) & (significant[self._near].max(axis=1) >= 1)
 
 
 def _skirts_of(bins: NDArray[np.int64], free: NDArray[np.int64], window: int) -> tuple[NDArray[np.int64], Complex]:
@@ -236,4 +236,4 @@ def _mean_beside(share: Floats) -> Floats:
 
 def _above(share: Floats, chance: float) -> Floats:
     """How much of what chance does not explain: 0 … 1."""
-    return np.clip((share - chance) / max(1 - chance, 0.2), 0.0, 1.0)
+    return np.clip(2 * (share - chance) / max(1 - chance, 0.2), 0.0, 1.0)

@@ -60,6 +60,13 @@ class MovingPeriods(StatefulBase):
         Whether there are verdicts at all.
     of_residual
         Whether the numerator is what a model leaves of the output: one more signal, after those of the roles.
+
+    Attributes
+    ----------
+    is_possible
+        Whether there can be verdicts.
+    told
+        Lines with an Event so far, shape (lines,).
     """
 
     _stage = Stage("moving-periods", 1)
@@ -75,7 +82,7 @@ class MovingPeriods(StatefulBase):
         roles = [settings.roles.index(name) for name in names]
         signals = [len(settings.roles) if of_residual else roles[0], *roles]
         at = self._distortion.at
-        self._enabled = enabled and at.size > 0 and settings.schedule is not None and not settings.hann
+        self.is_possible = enabled and at.size > 0 and settings.schedule is not None and not settings.hann
         self._places = np.ix_(np.array(signals), at)
         differenced, advanced = np.array(settings.differenced_roles), np.array(settings.advanced_ticks)
         self._after = after(at, lines.window, differenced, advanced)[[roles[0], *roles]]
@@ -108,7 +115,7 @@ class MovingPeriods(StatefulBase):
         """Add consecutive periods with their spectra, shape (signals, periods, bins)."""
         for number, moved in enumerate(moves.tolist()):
             self._moved = moved
-            if not (self._enabled and moved and periods.complete[number]):
+            if not (self.is_possible and moved and periods.complete[number]):
                 self.end_stretch()
             elif periods.schedule is not None:
                 of_period = times(spectra[:, number][self._places], self._after)
