@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Flags, Floats
 from livebode.core import Event, Stage, StatefulBase
-from livebode.estimation.moving_distortion import MovingDistortion, PeriodAtBins
+from livebode.estimation.moving_distortion import DistortionRows, MovingDistortion, PeriodsAtBins
 from livebode.estimation.periods import Periods
 from livebode.estimation.products import times
 from livebode.estimation.spectra import after
@@ -60,10 +60,17 @@ class MovingPeriods(StatefulBase):
         Whether there are verdicts at all.
     of_residual
         Whether the numerator is what a model leaves of the output: one more signal, after those of the roles.
+
+    Attributes
+    ----------
+    is_possible
+        Whether there can be verdicts.
+    told
+        Lines with an Event so far, shape (lines,).
     """
 
     _stage = Stage("moving-periods", 1)
-    _STATE = ("_distortion", "_sum", "_positions", "_periods", "_moved", "told")
+    _STATE = ("_distortion", "_sum", "_position", "_periods", "_moved", "told")
 
     def __init__(
         self, settings: Settings, events: list[Event], *, enabled: bool = True, of_residual: bool = False
@@ -73,69 +80,83 @@ class MovingPeriods(StatefulBase):
         self._distortion = MovingDistortion(lines, instrument=method.reference == "excitation")
         names: tuple[Role, Role, Role] = "output", method.denominator, method.reference
         roles = [settings.roles.index(name) for name in names]
-        signals = [len(settings.roles) if of_residual else roles[0], *roles]
+        self._signals = np.array([len(settings.roles) if of_residual else roles[0], *roles])
         at = self._distortion.at
-        self._enabled = enabled and at.size > 0 and settings.schedule is not None and not settings.hann
-        self._places = np.ix_(np.array(signals), at)
+        self.is_possible = enabled and at.size > 0 and settings.schedule is not None and not settings.hann
         differenced, advanced = np.array(settings.differenced_roles), np.array(settings.advanced_ticks)
-        self._after = after(at, lines.window, differenced, advanced)[[roles[0], *roles]]
+        self._after = after(at, lines.window, differenced, advanced)[[roles[0], *roles]][:, np.newaxis]
         self._each = max(1, round(lines.rate_hz / lines.window / _JUDGED_PER_S))
-        self._sum, self._positions = np.zeros((4, at.size), dtype=np.complex128), 0.0
+        self._sum, self._position = np.zeros((4, at.size), dtype=np.complex128), 0.0
         self._periods, self._moved = 0, False
         self.told = np.zeros(len(lines), dtype=np.bool_)
         self.begin()
 
     def begin(self) -> None:
         """Begin the verdicts with the present one."""
-        self._rows: list[tuple[Floats, Flags, bool]] = [(self.distortion, self._distortion.invalid, self._moved)]
+        now = self._distortion.now
+        self._rows = [MovingVerdicts(now.distortion, now.invalid, np.array([self._moved]))]
 
     def verdicts(self) -> MovingVerdicts:
         """The verdicts since `begin`."""
-        distortion, invalid, moves = zip(*self._rows)
-        return MovingVerdicts(np.stack(distortion), np.stack(invalid), np.array(moves))
+        return MovingVerdicts._make(map(np.concatenate, zip(*self._rows)))
 
     @property
     def distortion(self) -> Floats:
         """The newest verdict, shape (lines,); NaN where it is not known."""
-        return self._distortion.distortion
+        return np.asarray(self._distortion.now.distortion[0])
 
     def end_stretch(self) -> None:
         """The next period does not follow the previous one."""
         self._distortion.end_stretch()
-        self._sum[:], self._positions, self._periods = 0, 0.0, 0
+        self._sum[:], self._position, self._periods = 0, 0.0, 0
 
     def process(self, spectra: Complex, periods: Periods, moves: Flags, clock: PeriodClock) -> None:
         """Add consecutive periods with their spectra, shape (signals, periods, bins)."""
-        for number, moved in enumerate(moves.tolist()):
-            self._moved = moved
-            if not (self._enabled and moved and periods.complete[number]):
-                self.end_stretch()
-            elif periods.schedule is not None:
-                of_period = times(spectra[:, number][self._places], self._after)
-                if self._add(of_period, float(periods.schedule[number].mean())):
-                    self._report(clock, clock.last + number * self._settings.lines.window)
-            self._rows.append((self.distortion, self._distortion.invalid, moved))
+        now, which = self._distortion.now, np.zeros(len(moves), dtype=np.int64)
+        usable = moves & periods.complete
+        if not self.is_possible or periods.schedule is None or not usable.any():
+            self.end_stretch()
+        else:
+            of_periods = times(spectra[self._signals][:, :, self._distortion.at], self._after)
+            groups, usable, last = self._grouped(of_periods, periods.schedule.mean(axis=1), usable)
+            if last.size:
+                rows = self._distortion.process(groups, usable)
+                self._report(rows, clock, clock.last + last * self._settings.lines.window)
+                now = DistortionRows.joined([now, rows])
+                which = np.searchsorted(last, np.arange(len(moves)), side="right")
+        self._moved = bool(moves[-1])
+        self._rows.append(MovingVerdicts(now.distortion[which], now.invalid[which], moves))
 
-    def _add(self, spectra: Complex, position: float) -> bool:
-        """Add a period; whether there is a new verdict."""
-        self._sum += spectra
-        self._positions += position
-        self._periods += 1
-        if self._periods < self._each:
-            return False
-        numerator, output, denominator, reference = self._sum / self._each
-        mean = PeriodAtBins(numerator, output, denominator, reference, self._positions / self._each)
-        self._sum[:], self._positions, self._periods = 0, 0.0, 0
-        return self._distortion.process(mean)
+    def _grouped(
+        self, spectra: Complex, position: Floats, usable: Flags
+    ) -> tuple[PeriodsAtBins, Flags, NDArray[np.int64]]:
+        """Means over some usable periods each, and the number of the last one; the others interrupt them."""
+        if self._each == 1:
+            return PeriodsAtBins._make((*spectra, position)), usable, np.arange(len(usable))
+        means, positions, last = [], [], []
+        for number, is_usable in enumerate(usable.tolist()):
+            if is_usable:
+                self._sum += spectra[:, number]
+                self._position += float(position[number])
+                self._periods += 1
+            if not is_usable or self._periods == self._each:
+                means.append(self._sum / self._each)
+                positions.append(self._position / self._each)
+                last.append(number)
+                self._sum[:], self._position, self._periods = 0, 0.0, 0
+        groups = np.stack(means, axis=1) if means else spectra[:, :0]
+        ends = np.array(last, dtype=np.int64)
+        return PeriodsAtBins._make((*groups, np.array(positions))), usable[ends], ends
 
-    def _report(self, clock: PeriodClock, sample: int) -> None:
-        lines, found = self._settings.lines, self._distortion
-        speed = abs(found.speed) / (self._each * lines.window / lines.rate_hz)
-        for line in np.flatnonzero(found.invalid & ~self.told).tolist():
-            message, details = in_motion(float(lines.frequency_hz[line]), float(found.share[line]), speed, clock.unit)
-            time_s = clock.origin_s + sample / lines.rate_hz
-            self._events.append(Event("distorted", sample, time_s, message, details))
-        self.told |= found.invalid
+    def _report(self, rows: DistortionRows, clock: PeriodClock, sample: NDArray[np.int64]) -> None:
+        lines, seconds = self._settings.lines, self._each * self._settings.lines.window / self._settings.lines.rate_hz
+        for row, line in zip(*np.nonzero(rows.invalid & ~self.told)):
+            if not self.told[line]:
+                speed, share = abs(float(rows.speed[row])) / seconds, float(rows.share[row, line])
+                message, details = in_motion(float(lines.frequency_hz[line]), share, speed, clock.unit)
+                time_s = clock.origin_s + int(sample[row]) / lines.rate_hz
+                self._events.append(Event("distorted", int(sample[row]), time_s, message, details))
+                self.told[line] = True
 
 
 def in_motion(line_hz: float, share: float, speed: float, unit: str) -> tuple[Message, dict[str, float]]:

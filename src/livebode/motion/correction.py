@@ -361,6 +361,8 @@ class MotionCorrection(StatefulBase):
         at_standstill = np.isfinite(tracked.distortion)
         distortion = np.where(at_standstill, tracked.distortion, moving)
         valid &= at_standstill | ~against
+        if held and self._distortion.is_possible:  # friction contradicts the model, and nothing tells by how much
+            valid &= np.isfinite(distortion)
         return replace(
             tracked,
             value=np.where(valid, value, complex(np.nan, np.nan)),

@@ -14,8 +14,8 @@ class ResidualDistortion(StatefulBase):
     """Distortion of the responses of each chunk, from the residual r = y − y_model at the detection lines.
 
     The residual contains neither the motion nor the change of the machine, as far as the model explains them, so that
-    less than in the output itself is taken for skirts (`MovingDistortion`). Responses before the first verdict have
-    that of their chunk.
+    less than in the output itself is taken for skirts (`MovingDistortion`). Of the verdict at a response and the one at
+    the end of its chunk, which is from more periods, the larger distortion counts.
 
     Parameters
     ----------
@@ -33,6 +33,11 @@ class ResidualDistortion(StatefulBase):
         self._periods = MovingPeriods(settings, events, of_residual=True)
         self._stop = -1  # number of the sample after the newest period
 
+    @property
+    def is_possible(self) -> bool:
+        """Whether the lines have detection lines that show distortion."""
+        return self._periods.is_possible
+
     def process(self, residual: Floats, chunk: Chunk, tracked: Responses) -> tuple[Floats, Flags]:
         """Distortion and whether it makes a line invalid, (rows, lines); `residual` is NaN where it does not count."""
         window, lines = self._window, self._settings.lines
@@ -47,10 +52,8 @@ class ResidualDistortion(StatefulBase):
             self._add(residual, chunk, begin, count, PeriodClock(begin + window - 1, origin_s, "m"))
         verdicts = self._periods.verdicts()
         ended = ((tracked.sample + 1 - begin) // window).clip(0, count)
-        known = np.flatnonzero(np.isfinite(verdicts.distortion[:, 0]))
-        if known.size:
-            ended = np.maximum(ended, known[0])
-        return verdicts.distortion[ended], verdicts.invalid[ended]
+        distortion, invalid = verdicts.distortion[ended], verdicts.invalid[ended]
+        return np.fmax(distortion, verdicts.distortion[-1]), invalid | verdicts.invalid[-1]
 
     def _add(self, residual: Floats, chunk: Chunk, begin: int, count: int, clock: PeriodClock) -> None:
         channels = {"output": chunk.y, "input": chunk.u, "excitation": chunk.w}
