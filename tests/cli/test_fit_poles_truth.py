@@ -59,6 +59,10 @@ def test_three_outputs_of_an_aircraft_share_their_short_period(aircraft: list[Pa
     omega = np.sqrt(1.0 * 1.5 + 0.96 * 16.0)
     code, found = fit(aircraft, "--model", "modal")
     assert (code, found["order"]) == (0, 1)
+    assert not (aircraft[2] / "stabilisation.svg").exists()
+    fit(aircraft[2:], "--model", "modal", "--order", 1)
+    assert "Stabilisation" not in (chart := (aircraft[2] / "stabilisation.svg").read_text())
+    assert "order of the model" in chart
     for name, truth in (("frequency_1", omega / (2 * np.pi)), ("damping_1", 2.5 / (2 * omega))):
         quantity = found["quantities"][name]
         assert abs(quantity["value"] - truth) < 2 * quantity["bound_95"]

@@ -31,3 +31,25 @@ def test_sixteen_modes_of_little_noise_are_found_without_an_order() -> None:
     assert (found.status, found.order, found.complete) == ("ok", 16, True)
     for i, (f, _) in enumerate(sorted(modes)):
         assert found[f"frequency_{i + 1}"] == pytest.approx(100 * f, abs=4 * found.bound(f"frequency_{i + 1}", 0.68))
+
+
+def test_seven_modes_of_an_aircraft_are_found_in_a_model_error_of_six_percent() -> None:
+    """As of a weakly nonlinear structure: an error of the response that is alike at neighbouring lines, not noise."""
+    modes = ((3.48, 0.013), (3.97, 0.016), (5.19, 0.009), (6.60, 0.0054), (7.07, 0.010), (7.32, 0.0046), (9.17, 0.0072))
+    lines = Lines.parse("2:15:0.05", rate_hz=100.0, window=2000)
+    truth = sampled(machine(modes, np.array([[1.0, -0.8, 0.9, 1.0, -0.6, 2.0, 1.2]])), lines)
+    window = np.hanning(9) / np.linalg.norm(np.hanning(9))
+    parts = [np.convolve(x, window, "same") for x in np.random.default_rng(0).standard_normal((2, len(lines)))]
+    error = 0.06 * (parts[0] + 1j * parts[1]) / np.sqrt(2)
+    found = fit_common_poles(measured(lines, truth * (1 + error), 1e-3, 0))
+    assert (found.status, found.order, found.complete) == ("ok", 7, False)
+    assert "further modes do not explain" in found.about_bounds
+    for i, (frequency, _) in enumerate(modes):
+        assert found[f"frequency_{i + 1}"] == pytest.approx(frequency, rel=0.005)
+
+
+def test_a_specified_order_does_not_say_that_further_modes_were_tried() -> None:
+    lines = Lines.parse("2:120:2", rate_hz=1000.0, window=1000)
+    system = machine(((12.0, 0.02), (60.0, 0.05)), np.array([[1.0, 0.5]]))
+    found = fit_common_poles(measured(lines, sampled(system, lines), 0.005, 0), order=1)
+    assert "further modes were not tried, because the order is specified" in found.about_bounds

@@ -72,7 +72,8 @@ def fit_command(
     """Fit a model to the response of a run, and print its parameters with bounds.
 
     With modal or rational the outputs of several runs have their poles in common, and so do all entries of a matrix run
-    (rational by default). Defaults are from the run's \\[fit] section. Exit code 3 if no model fits.
+    (rational by default). Of one run, modal writes stabilisation.svg to its directory. Defaults are from the run's
+    \\[fit] section. Exit code 3 if no model fits.
     """
     from livebode.configuration import check_model
     from livebode.fitting import POLE_MODELS, Kind
@@ -165,7 +166,9 @@ def _fit_poles(
     own = recorded_configuration(runs[0].summary).get("fit", {})
     kept = {name: own[name] for name in ("band_hz", "hold") if name in own}
     section = _section(runs[0].path, kept | {name: specified[name] for name in specified if name != "model"})
-    _show_poles(*fit_poles(runs, model, section, order), as_json)
+    found, remarks = fit_poles(runs, model, section, order)
+    picture = _chart(found, runs[0].path) if model == "modal" and len(runs) == 1 else None
+    _show_poles(found, remarks, as_json, picture)
 
 
 def _check_options(model: Kind, specified: dict[str, Any]) -> None:
@@ -179,7 +182,18 @@ def _check_options(model: Kind, specified: dict[str, Any]) -> None:
         )
 
 
-def _show_poles(found: CommonPoles, remarks: list[str], as_json: bool) -> None:
+def _chart(found: CommonPoles, run: Path) -> Path:
+    """The picture of the stabilisation chart in the directory of the run."""
+    from livebode.cli.remote import results_directory
+    from livebode.core import RecordError, writing
+    from livebode.pictures import save_stabilisation
+
+    into = results_directory(run)
+    with writing(into, RecordError):
+        return save_stabilisation(found, into, title=run.name)
+
+
+def _show_poles(found: CommonPoles, remarks: list[str], as_json: bool, picture: Path | None = None) -> None:
     from livebode.analysis import plain_poles
     from livebode.cli.pictures import show_poles
     from livebode.records import to_json
@@ -190,6 +204,8 @@ def _show_poles(found: CommonPoles, remarks: list[str], as_json: bool) -> None:
         show_poles(found)
         for remark in remarks:
             print(f"  {remark}")
+        if picture is not None:
+            print(f"\n{picture}")
     if found.status != "ok":
         raise typer.Exit(3)
 

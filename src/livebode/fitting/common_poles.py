@@ -21,6 +21,7 @@ from livebode.fitting.pole_search import ORDER_MAX, Kind, possible, search
 from livebode.fitting.problem import MeasuredRows
 from livebode.fitting.rows import EPSILON_MAX, NO_FIT, NO_RESPONSE, NOT_CONVERGED, NOT_SEEN, SENTENCES
 from livebode.fitting.separable import Outputs, SeparatedFit, whole_covariance
+from livebode.fitting.stabilisation import Chart
 from livebode.fitting.weights import chi_squared, squares
 from livebode.language import Message
 
@@ -54,6 +55,12 @@ class CommonPoles:
         Outputs whose residuals follow a pattern over the lines.
     specified
         Whether the order was specified.
+    enough_lines
+        Whether the lines are enough for a further pair of poles, so that it was tried unless the order was specified.
+    magnitude
+        |Ĝ| of the first output at the lines, NaN where it is not used.
+    chart
+        Poles of models of increasing order, with which the search began.
     raw_covariance
         Of the coefficients of `best`: those of the poles and delays, then the weights of each output.
     """
@@ -71,6 +78,9 @@ class CommonPoles:
     correlation: Floats
     patterned: tuple[str, ...]
     specified: bool
+    enough_lines: bool
+    magnitude: Floats
+    chart: Chart
     raw_covariance: Floats
 
     @property
@@ -123,9 +133,17 @@ class CommonPoles:
         """What the bounds cover, as text."""
         if self.complete:
             return Message("the residuals are white over the lines; ± covers 95 %")
+        what = "modes" if self.model == "modal" else "poles"
+        if self.specified:
+            why = f"; further {what} were not tried, because the order is specified"
+        elif self.order >= ORDER_MAX[self.model]:
+            why = f"; more than {self.order} {what} were not tried"
+        elif not self.enough_lines:
+            why = f"; there are too few lines to try further {what}"
+        else:
+            why = f", which further {what} do not explain"
         return (
-            f"the residuals of {', '.join(self.patterned)} follow a pattern over the lines, which further poles do "
-            "not explain; ± is not a 95 % bound"
+            f"the residuals of {', '.join(self.patterned)} follow a pattern over the lines{why}; ± is not a 95 % bound"
         )
 
     def __getitem__(self, name: str) -> float:
@@ -244,8 +262,15 @@ def assembled(
     return CommonPoles(
         model, names, blank.units, chosen, outs.grid, outs.unit, tuple((_order(of, model), of.cost) for of in best),
         parameters, chosen.epsilon, _reduced_chi2(outs, chosen), correlated,
-        tuple(name for name, high in zip(names, correlated > limit) if high), specified, covariance,
+        tuple(name for name, high in zip(names, correlated > limit) if high), specified,
+        outs.enough_for(replace(chosen.structure, pairs=chosen.structure.pairs + 1)),
+        _magnitude(outs), outs.chart, covariance,
     )  # fmt: skip
+
+
+def _magnitude(outs: Outputs) -> Floats:
+    """|Ĝ| of the first output, (lines,)."""
+    return np.where(outs.measured.use[0], np.abs(outs.measured.value[0]), np.nan)
 
 
 def _order(of: SeparatedFit, model: Kind) -> int:
@@ -323,6 +348,9 @@ class _Blank:
             nan,
             (),
             False,
+            False,
+            _magnitude(outs),
+            outs.chart,
             np.empty((0, 0)),
         )
 

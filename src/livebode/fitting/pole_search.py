@@ -22,7 +22,6 @@ from livebode.fitting.separable import (
     solve,
     stacked,
 )
-from livebode.fitting.stabilisation import stabilisation_chart
 
 Kind = Literal["modal", "rational"]
 
@@ -38,13 +37,14 @@ _PEAKS, _WIDTHS = 24, (0.3, 1.0, 4.0)  # lines with the largest residuals; half-
 _SPREAD, _DAMPINGS = 30, (0.02, 0.1, 0.4)
 _BEYOND = 1.5  # times the highest line, or the lowest line over it: a mode outside is a residual term
 _NARROW = 0.1  # of the spacing of lines, for the half-width of a mode
-_SLACK = 0.7  # damping ratio of a pole between the lines that is too smooth to be a mode
+_SMOOTH = 0.7  # damping ratio of a pole between the lines that is too smooth to be a mode
 _RESIDUAL = 2  # pairs outside of the lines
 _OUTSIDE = ((2.5, 0.01), (1.3, 0.3), (0.4, 0.01), (0.2, 0.7))  # times the lines, and damping ratios, of their starts
 _WEAKEST = 2  # modes to try a fit without
 _FAR = 30.0  # times the highest line, or the lowest line over it: a pole outside is an integrator or a direct term
 _EVALUATIONS_FIRST = 12  # of a start, before the best one is continued
 _ROUNDS_SEARCH, _ROUNDS_LAST = 2, 8  # of reweighting: a search only compares costs, the result needs ε to converge
+_INCOMPLETE = 0.02  # model error with which modes may be missing
 _ROUGH = 0.1  # model error with which a delay cannot be told from missing poles
 _EARLIEST_TICKS, _LATEST_TICKS, _LATEST_S = 2.0, 5.0, 0.02
 
@@ -81,8 +81,7 @@ def degree(of: SeparatedFit, kind: Kind) -> int:
 def _charted(outputs: Outputs, none: SeparatedFit, kind: Kind) -> SeparatedFit:
     """The best fit with poles of one order of the chart, or `none`."""
     tried = [none]
-    chart = stabilisation_chart(outputs)
-    for every, stable in zip(chart.poles, chart.stable):
+    for every, stable in zip(outputs.chart.poles, outputs.chart.stable):
         for of in (every[stable], every[every.real < 0]):
             a1, a0 = -2 * of.real, np.abs(of) ** 2
             modes = ~_outside(outputs, a1, a0)
@@ -90,7 +89,8 @@ def _charted(outputs: Outputs, none: SeparatedFit, kind: Kind) -> SeparatedFit:
             if structure.pairs and outputs.enough_for(structure):
                 start = np.stack([a1, a0], axis=1)[modes].ravel()
                 tried.append(_fit(outputs, structure, start, kind, rounds=1, evaluations=0))
-    best = min(tried, key=lambda fitted: fitted.misfit + _price(outputs, fitted.structure))
+    # By the criterion of Akaike: poles that are not fitted yet lower the misfit too little for their price.
+    best = min(tried, key=lambda fitted: fitted.misfit + 2 * fitted.structure.size)
     best = _thinned(outputs, _fit(outputs, best.structure, best.theta, kind))
     return _with_residual(outputs, _fit(outputs, best.structure, best.theta, kind), kind)
 
@@ -101,8 +101,11 @@ def _price(outputs: Outputs, of: Structure) -> float:
 
 
 def _thinned(outputs: Outputs, of: SeparatedFit) -> SeparatedFit:
-    """Without the modes that would lower the misfit by less than their price; the other poles remain where they are."""
-    while of.structure.modes:
+    """Without the modes that lower the misfit by less than their price; the other poles remain where they are.
+
+    Where the model is far from the lines yet, what a mode lowers says little.
+    """
+    while of.structure.modes and np.max(of.epsilon) < _INCOMPLETE:
         lost = lost_without(outputs, of)[: of.structure.modes]
         i, narrower = int(np.argmin(lost)), replace(of.structure, pairs=of.structure.pairs - 1)
         if lost[i] > _price(outputs, of.structure) - _price(outputs, narrower):
@@ -179,13 +182,10 @@ def _remove(outputs: Outputs, grown: Grown, last: int) -> None:
 
 
 def _weakest(outputs: Outputs, of: SeparatedFit) -> Iterator[tuple[Structure, Floats]]:
-    """Without one of the modes that explain least, and without all that are not damped."""
+    """Without one of the modes that explain least."""
     structure = of.structure
-    weakest = np.argsort(lost_without(outputs, of)[: structure.modes])[:_WEAKEST]
-    undamped = np.flatnonzero(structure.pairs_of(of.theta)[: structure.modes, 0] < 0)
-    for without in [[int(i)] for i in weakest] + [undamped.tolist()] * bool(undamped.size):
-        columns = [2 * i + k for i in without for k in range(2)]
-        yield replace(structure, pairs=structure.pairs - len(without)), np.delete(of.theta, columns)
+    for i in np.argsort(lost_without(outputs, of)[: structure.modes])[:_WEAKEST]:
+        yield replace(structure, pairs=structure.pairs - 1), np.delete(of.theta, [2 * i, 2 * i + 1])
 
 
 def _finished(outputs: Outputs, grown: list[SeparatedFit], kind: Kind) -> list[SeparatedFit]:
@@ -235,10 +235,12 @@ def _fit(
 
 
 def _outside(outputs: Outputs, a1: Floats, a0: Floats) -> NDArray[np.bool_]:
-    """Which pairs are outside of the lines, or too smooth between them for a mode."""
+    """Which pairs are no modes: outside of the lines, not damped, or too smooth between the lines."""
     low, high = 2 * np.pi * outputs.grid.frequency_hz[[0, -1]]
     within = (a0 > (low / _BEYOND) ** 2) & (a0 < (high * _BEYOND) ** 2)
-    return np.asarray(~within | (a1 > 2 * _SLACK * np.sqrt(np.abs(a0))))
+    # A mode much narrower than the spacing of lines may by noise have a damping a little below zero.
+    damped = a1 > -_NARROW * 4 * np.pi * np.min(np.diff(outputs.grid.frequency_hz), initial=np.inf)
+    return np.asarray(~within | ~damped | (a1 > 2 * _SMOOTH * np.sqrt(np.abs(a0))))
 
 
 def possible(outputs: Outputs, of: SeparatedFit, kind: Kind) -> bool:
@@ -253,10 +255,7 @@ def possible(outputs: Outputs, of: SeparatedFit, kind: Kind) -> bool:
         return bool(((size > ends[0] / _FAR) & (size < ends[1] * _FAR)).all())
     a1, a0 = of.structure.pairs_of(of.theta).T
     outside = _outside(outputs, a1, a0)
-    a1, a0 = a1[: of.structure.modes], a0[: of.structure.modes]
-    # A mode much narrower than the spacing of lines may by noise have a damping a little below zero.
-    damped = a1 > -_NARROW * 4 * np.pi * np.min(np.diff(outputs.grid.frequency_hz), initial=np.inf)
-    return bool(damped.all() and not outside[: of.structure.modes].any() and outside[of.structure.modes :].all())
+    return bool(not outside[: of.structure.modes].any() and outside[of.structure.modes :].all())
 
 
 def _delayed(outputs: Outputs, of: SeparatedFit) -> list[SeparatedFit]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from livebode.fitting.partial_fractions import PartialFractions, Structure
 from livebode.fitting.physical import EvaluationGrid
 from livebode.fitting.problem import MeasuredRows, Solution
 from livebode.fitting.rows import covariance
+from livebode.fitting.stabilisation import Chart, stabilisation_chart
 from livebode.fitting.weights import epsilon_for, misfit_by, squares, weights
 
 _FIRST_EPSILON = 0.1
@@ -40,6 +42,11 @@ class Outputs:
     def unit(self) -> float:
         """Geometric mean of the lines, in rad/s."""
         return float(2 * np.pi * np.exp(np.mean(np.log(self.grid.frequency_hz))))
+
+    @cached_property
+    def chart(self) -> Chart:
+        """Poles of models of increasing order."""
+        return stabilisation_chart(self.measured, self.grid)
 
     @property
     def count(self) -> int:

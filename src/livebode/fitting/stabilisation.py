@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from livebode.arrays import Complex, Floats
 from livebode.dataclass import dataclass
 from livebode.fitting.physical import EvaluationGrid
-from livebode.fitting.separable import Outputs
+from livebode.fitting.problem import MeasuredRows
 from livebode.fitting.weights import weights
 
 _ROWS_MAX, _ROWS_OF_ALL = 160, 480  # of powers of z, and times the number of outputs
@@ -36,27 +36,26 @@ class Chart:
     stable: tuple[NDArray[np.bool_], ...]
 
 
-def stabilisation_chart(outputs: Outputs, epsilon: float = 0.0) -> Chart:
+def stabilisation_chart(measured: MeasuredRows, grid: EvaluationGrid) -> Chart:
     """Poles of subspace models of the responses, without start values.
 
     The lines are mapped to an arc of the unit circle, on which a system in s, or sampled behind a hold, remains one of
     the same order with real coefficients (bilinear map). Powers z^i·G(z) without the part that powers of z alone
     explain have the range of the observability matrix (McKelvey, Akçay and Ljung, IEEE Trans. Autom. Control 41(7),
-    1996, algorithm 2), lines weighted by their variance sigma² + (ε|G|)², rows by the covariance of the noise. One
+    1996, algorithm 2), lines weighted by their sigma, rows by the covariance of the noise. One
     singular value decomposition serves all orders.
 
     Bias: that of least squares where the noise has another covariance than its sigma; the poles are starts of a fit.
     """
-    measured = outputs.measured
     use = measured.use.all(axis=0)
     lines, count = int(np.count_nonzero(use)), len(measured.value)
     rows = min(2 * lines // 3, _ROWS_MAX, _ROWS_OF_ALL // count)
     highest = min(_ORDER_MAX, (rows - 2) * count)
     if rows < 4:
         return Chart((), (), ())
-    arc = _Arc(outputs.grid)
+    arc = _Arc(grid)
     z, value = arc.z[use], measured.value[:, use]
-    each = weights(measured.sigma[:, use], np.abs(value), np.full(count, epsilon))
+    each = weights(measured.sigma[:, use], np.abs(value), np.zeros(count))
     each = np.where(each > 0, each, 1 / np.maximum(np.abs(value), 1e-300))
     each = each / np.sqrt(np.mean(np.abs(each * value) ** 2, axis=1, keepdims=True))
     common = 1 / np.sqrt(np.mean(1 / each**2, axis=0))
@@ -71,7 +70,7 @@ def stabilisation_chart(outputs: Outputs, epsilon: float = 0.0) -> Chart:
     orders = tuple(range(_STEP, highest + 1, _STEP))
     poles = [arc.poles(_shifted(directions[:, :order], count)) for order in orders]
     seen = [of[of.imag > 0] for of in poles]
-    least = _APART * 2 * np.pi * float(np.min(np.diff(outputs.grid.frequency_hz), initial=np.inf))
+    least = _APART * 2 * np.pi * float(np.min(np.diff(grid.frequency_hz), initial=np.inf))
     stable = [
         (of.real < 0) & _near(of, before, least) & _near(of, after, least)
         for of, before, after in zip(seen, [seen[0], *seen[:-1]], [*seen[1:], seen[-1]])

@@ -62,6 +62,8 @@ from livebode.pictures.plots import draw_nyquist as draw_nyquist
 from livebode.pictures.plots import plot_matrix as plot_matrix
 from livebode.pictures.plots import plot_responses as plot_responses
 from livebode.pictures.run_pictures import save_pictures as save_pictures
+from livebode.pictures.stabilisation import save_stabilisation as save_stabilisation
+from livebode.pictures.stabilisation import stabilisation_figure as stabilisation_figure
 from livebode.pictures.terminal import Canvas as Canvas
 from livebode.pictures.terminal import CellScale as CellScale
 from livebode.pictures.terminal import terminal_bode as terminal_bode
