@@ -21,6 +21,7 @@ from livebode.runtime import Document, Estimate, FitResults, Outcome, versions
 from livebode_modes.mode_tracker import ModeTracker, WindowModes
 from livebode_modes.output_only_settings import OutputOnlySettings
 from livebode_modes.stabilisation import Mode
+from livebode_modes.tone_windows import ToneWindows, tone_event
 
 Kind = Literal["mode", "harmonic"]
 
@@ -269,6 +270,7 @@ class OutputOnly(Estimate):
     def __init__(self, axis: Axis, settings: OutputOnlySettings) -> None:
         self.axis, self.settings = axis, settings
         self._tracker, self._tracks = ModeTracker(settings), Tracks(settings.hops)
+        self._tones = ToneWindows(settings.hops)
         self._summaries = ModeSummaries()
         self._windows: Counter[str] = Counter()
         self._threads = ThreadpoolController()
@@ -314,7 +316,11 @@ class OutputOnly(Estimate):
         return np.array([[window.status == "ok"] for window in results], dtype=np.bool_).reshape(-1, 1)
 
     def documents(self, results: list[WindowModes]) -> Iterator[Document]:
-        for window in results:
+        for result in results:
+            yield from self._tracked(self._tones.process(result))
+
+    def _tracked(self, windows: list[WindowModes]) -> Iterator[Document]:
+        for window in windows:
             self._windows[window.status] += 1
             yield from self._rows(self._tracks.process(window))
 
@@ -325,6 +331,7 @@ class OutputOnly(Estimate):
                 self._summaries.add(part)
 
     def judge(self) -> Iterable[Document]:
+        yield from self._tracked(self._tones.finish())
         if not self._windows:
             raise SignalError(
                 "too-short",
@@ -332,7 +339,7 @@ class OutputOnly(Estimate):
                 "choose a shorter window, or record more",
                 window=self.settings.window,
             )
-        return self._rows(self._tracks.finish())
+        yield from self._rows(self._tracks.finish())
 
     def describe(self, about: Mapping[str, Any], channels: Sequence[Channel]) -> dict[str, Any]:  # noqa: ARG002
         facts = self.settings.found() | about["found"]
@@ -340,8 +347,9 @@ class OutputOnly(Estimate):
 
     def summary(self, sample: int, time_s: float) -> tuple[dict[str, Any], list[Event]]:
         run_s, recorded_s = self.run.counts.run_s, self.counts["samples"] / self.rate_hz
-        events = self._summaries.harmonic_events(sample, time_s)
-        if not self._summaries.modes:
+        tones = self._tones.tones
+        events = [*map(tone_event, tones), *self._summaries.harmonic_events(sample, time_s)]
+        if not self._summaries.modes and not tones:
             events.append(Event("no-modes", sample, time_s, _NO_MODES))
         done = self.describe(self.run.about, self.run.source.channels) | {
             "counts": self.counts | {"windows": self._windows.total()},
@@ -349,6 +357,7 @@ class OutputOnly(Estimate):
             "speed": {"recorded_s": recorded_s, "run_s": run_s, "times_real_time": recorded_s / run_s},
             "modes": self._summaries.modes,
             "harmonics": self._summaries.harmonics,
+            "moving_tones": tones,
         }
         return done, events
 

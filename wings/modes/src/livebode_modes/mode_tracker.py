@@ -12,6 +12,7 @@ from livebode.core import Block, Emit, Event, ignore
 from livebode.dataclass import dataclass
 from livebode.language import Message
 from livebode_modes.correlations import hop_correlations
+from livebode_modes.moving_tone import MovingTone, moving_tone
 from livebode_modes.output_only_settings import HOPS_MIN, OutputOnlySettings
 from livebode_modes.reduction import PASSED, Reduction
 from livebode_modes.refinement import Refinement
@@ -38,7 +39,7 @@ def is_harmonic(mode: Mode, y: Floats, rate_hz: float) -> bool:
     """
     omega = 2 * np.pi * mode.frequency_hz
     window_s = y.shape[0] * y.shape[2] / rate_hz
-    damping = mode.damping - _SIGMAS * float(np.sqrt(mode.covariance[1, 1]))
+    damping = mode.damping + _SIGMAS * float(np.sqrt(mode.covariance[1, 1]))
     if damping * omega * window_s > _DECAYS:
         return False
     pairs = np.concatenate([y[:-1], y[1:]], axis=2)  # a longer part separates a line better from a mode beside it
@@ -73,6 +74,8 @@ class WindowModes:
         "ok", or "gaps" if too many of the window's hops are incomplete.
     order
         Order of the model.
+    tone
+        The moving tone that has most of the power, with which there are no modes.
     """
 
     sample: int
@@ -82,6 +85,7 @@ class WindowModes:
     harmonics: tuple[Mode, ...]
     status: str = "ok"
     order: int = 0
+    tone: MovingTone | None = None
 
 
 class ModeTracker:
@@ -203,8 +207,12 @@ class ModeTracker:
         correlations = np.array([r for r, _ in whole])
         if not np.all(np.einsum("kii->i", correlations[:, 0]) > 0):  # an output does not change
             return WindowModes(newest, time_s, schedule, (), ())
-        subspace = Subspace(correlations, of.rows, of.reduced_rate_hz)
         samples = np.array([y for _, y in whole])
+        if len(whole) == of.hops:
+            for output in np.concatenate(list(samples), axis=1):
+                if (tone := moving_tone(output, of.reduced_rate_hz, of.band_hz)) is not None:
+                    return WindowModes(newest, time_s, schedule, (), (), tone=tone)
+        subspace = Subspace(correlations, of.rows, of.reduced_rate_hz)
         modes, harmonics = list[Mode](), list[Mode]()
         order, stable = stable_modes(subspace, of.band_hz)
         for mode in stable:

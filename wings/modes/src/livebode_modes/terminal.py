@@ -18,6 +18,7 @@ from livebode.locations import original
 from livebode.pictures import Canvas, CellScale, clock, linear_ticks, written
 from livebode.runtime import Outcome
 from livebode_modes.curves import ModeCurve, mode_curves
+from livebode_modes.tone_windows import tone_event
 
 if TYPE_CHECKING:
     from livebode_modes.estimate import OutputOnly
@@ -129,7 +130,9 @@ def mode_lines(summary: dict[str, Any]) -> list[str]:
     """The result of an output-only run in sentences."""
     counts, facts, speed = summary["counts"], summary["found"], summary["speed"]
     low_hz, high_hz = facts["band_hz"]
-    lines = [_mode(track) for track in summary["modes"]] or [_no_mode(facts["window"] / facts["rate_hz"])]
+    lines = [_mode(track) for track in summary["modes"]]
+    lines += [_moving_tone(tone) for tone in summary["moving_tones"]]
+    lines = lines or [_no_mode(facts["window"] / facts["rate_hz"])]
     lines += [_harmonic(track) for track in summary["harmonics"]]
     gaps = f", {counted(counts['gaps'], 'gap')}" if counts["gaps"] else ""
     lines.append(
@@ -164,6 +167,10 @@ def _harmonic(track: dict[str, Any]) -> str:
         f"{track['name']}: {track['newest']['frequency_hz']:.5g} Hz, constant amplitude and almost no damping: not a "
         f"mode; {_range(track)}"
     )
+
+
+def _moving_tone(tone: dict[str, Any]) -> str:
+    return f"{tone_event(tone).message} (--input CHANNEL --estimator lpm; --from, --to)"
 
 
 def _range(track: dict[str, Any]) -> str:
