@@ -12,7 +12,8 @@ from livebode.runtime import Document, TrackerResults
 _KINDS = {
     "roles-doubtful", "transient", "outlying-periods", "phase-slip", "phase-slips", "restart", "replaced",
     "computer-clock", "foreign", "backlog", "backlog-cleared", "waiting", "window-doubtful",
-    "drift", "response-changes", "not-periodic", "distortion-levels", "best-linear-approximation", "recordings-differ",
+    "drift", "response-changes", "periodic-variation",
+    "not-periodic", "distortion-levels", "best-linear-approximation", "recordings-differ",
     "uneven-clock", "long-recording", "suppressed", "sink-down", "sink-up", "sink-full", "sink-refused",
 }  # fmt: skip
 _ONCE = {"foreign", "suppressed"}
