@@ -18,6 +18,7 @@ from livebode.estimation.moving_periods import PeriodClock as PeriodClock
 from livebode.estimation.nonperiodic_stage import separable as separable
 from livebode.estimation.nonperiodic_tracker import NonPeriodicTracker as NonPeriodicTracker
 from livebode.estimation.periods import Periods as Periods
+from livebode.estimation.periodic_variation import PeriodicVariation as PeriodicVariation
 from livebode.estimation.quantities import convert as convert
 from livebode.estimation.quotient import WINDOW_MIN as WINDOW_MIN
 from livebode.estimation.quotient import LocalPolynomial as LocalPolynomial

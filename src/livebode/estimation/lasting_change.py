@@ -82,11 +82,10 @@ class LastingChange(StatefulBase):
         while done < len(sample):
             stop = min(len(sample), done + self._until_complete())
             now = slice(done, stop)
-            low, high = np.fmin.reduce(schedule[now]), np.fmax.reduce(schedule[now])
-            self._schedule = np.array([np.fmin(self._schedule[0], low), np.fmax(self._schedule[1], high)])
+            self._schedule = with_extremes(self._schedule, schedule[now])
             done = stop
             if self._windows < 0:
-                self._reference = _added(self._reference, pair[:, now])
+                self._reference = added(self._reference, pair[:, now])
                 self._windows += now.stop - now.start
                 continue
             self._add(pair[:, now], float(time_s[stop - 1]))
@@ -102,18 +101,15 @@ class LastingChange(StatefulBase):
 
     def _add(self, pair: Complex, time_s: float) -> None:
         """Add windows of one group."""
-        with np.errstate(all="ignore"):
-            ratio = divided(self._reference[0], self._reference[1])
-            error = divided(scaled(pair[0] - times(ratio, pair[1]), _REFERENCE), self._reference[1])
-        error = np.where(np.isfinite(error), error, 0.0)
+        error = window_errors(scaled(self._reference, 1 / _REFERENCE), pair)
         before = self._newest if self._windows else error[0]
-        self._steps = _added(self._steps, power(np.diff(error, axis=0, prepend=before[np.newaxis])))
+        self._steps = added(self._steps, power(np.diff(error, axis=0, prepend=before[np.newaxis])))
         self._newest = error[-1]
         group = self._windows >> self._level
         if group == _GROUPS_MAX:
             self._merge()
             group = _GROUPS_MAX // 2
-        self._sums[group] = _added(self._sums[group], error)
+        self._sums[group] = added(self._sums[group], error)
         self._ends[group] = time_s
         self._windows += len(error)
 
@@ -130,8 +126,7 @@ class LastingChange(StatefulBase):
 
     def _change(self) -> tuple[int, int, complex, float] | None:
         """Groups before the change, the line with the clearest one, its share of the response, and sigma of that."""
-        low, high = self._schedule
-        if high - low > _MOVED * max(abs(low), abs(high)):
+        if has_moved(self._schedule):
             return None
         groups, size = self._windows >> self._level, 1 << self._level
         means = scaled(self._sums[:groups], 1 / size)
@@ -170,6 +165,24 @@ class LastingChange(StatefulBase):
         self._events.append(Event("response-changes", sample, time_s, message))
 
 
-def _added(sums: NDArray[Any], rows: NDArray[Any]) -> NDArray[Any]:
+def window_errors(reference: Complex, pair: Complex) -> Complex:
+    """Changes of the response in windows, to first order: (numerator − Ĝ·denominator)/denominator of the reference."""
+    with np.errstate(all="ignore"):
+        error = divided(pair[0] - times(divided(reference[0], reference[1]), pair[1]), reference[1])
+    return np.where(np.isfinite(error), error, 0.0)
+
+
+def with_extremes(extremes: Floats, values: Floats) -> Floats:
+    """Smallest and largest value so far; NaN without one."""
+    return np.array([np.fmin(extremes[0], np.fmin.reduce(values)), np.fmax(extremes[1], np.fmax.reduce(values))])
+
+
+def has_moved(extremes: Floats) -> bool:
+    """Whether a schedule with these extremes varies by more than a thousandth."""
+    low, high = extremes
+    return bool(high - low > _MOVED * max(abs(low), abs(high)))
+
+
+def added(sums: NDArray[Any], rows: NDArray[Any]) -> NDArray[Any]:
     """Sums and rows, (…, rows, lines), added one after the other: as if they came one by one, to the bit."""
     return np.asarray(np.cumsum(np.concatenate([sums[..., np.newaxis, :], rows], axis=-2), axis=-2)[..., -1, :])

@@ -15,6 +15,7 @@ from livebode.estimation.detection import DetectionNoise, beyond
 from livebode.estimation.implausible import FACTOR, PlausibleRange
 from livebode.estimation.lasting_change import LastingChange
 from livebode.estimation.movement import Movement
+from livebode.estimation.periodic_variation import PeriodicVariation
 from livebode.estimation.periods import PeriodMoments
 from livebode.estimation.products import power, times
 from livebode.estimation.quantities import LineEstimates
@@ -78,7 +79,14 @@ class LineStage(StatefulBase):
 
             name = settings.input or ""
             self._periodicity = Periodicity(lines, self._places, name, self._events)
-        self._change = LastingChange(lines, self._events) if settings.average else None
+        self._change = self._variation = None
+        if settings.average:
+            self._change = LastingChange(lines, self._events)
+            # Two windows in a period, where they are equally far from each other: a period of the change is shown
+            # up to twice the frequency.
+            self._parts = 2 if lines.window % settings.step == 0 and self._places % 2 == 0 else 1
+            distance = max(lines.window, settings.step) // self._parts
+            self._variation = PeriodicVariation(lines, distance, self._events)
         self._moving = 0
         self._largest = 0.0
 
@@ -93,15 +101,16 @@ class LineStage(StatefulBase):
         return LineSettings(*weighting, s.average, denominator, reference, noise, noise_dof, chosen_instruction_set())
 
     def _state(self) -> dict[str, Any]:
-        parts = {"periodicity": self._periodicity, "change": self._change}
+        parts = {"periodicity": self._periodicity, "change": self._change, "variation": self._variation}
         return super()._state() | {name: part for name, part in parts.items() if part is not None}
 
     def _load(self, state: dict[str, Any]) -> None:
         super()._load(state)
         if self._periodicity is not None and "periodicity" in state:  # older states have none
             self._periodicity.restore(state["periodicity"])
-        if self._change is not None:
-            self._change.restore(state["change"])
+        for name, part in (("change", self._change), ("variation", self._variation)):
+            if part is not None:
+                part.restore(state[name])
 
     @property
     def bins(self) -> NDArray[np.int64]:
@@ -219,8 +228,8 @@ class LineStage(StatefulBase):
             np.concatenate([centre, first[np.newaxis]]),
         )
         results, self._largest = process_lines(self._kernel_settings, self._moments.arrays, windows)
-        if self._change is not None:
-            self._look_for_change(self._change, series, signals, results.usable, centre, rows.sample)
+        if self._change is not None and self._variation is not None:
+            self._look_for_change(self._change, self._variation, series, signals, results.usable, centre, rows.sample)
         estimates = LineEstimates.of(results)
         if ripple is not None:
             estimates = estimates.with_ripple(ripple, power(signals[s.method.denominator][:, :lines]))
@@ -294,14 +303,16 @@ class LineStage(StatefulBase):
     def _look_for_change(
         self,
         change: LastingChange,
+        variation: PeriodicVariation,
         series: int,
         signals: dict[Role, Complex],
         usable: Flags,
         centre: Floats,
         sample: NDArray[np.int64],
     ) -> None:
-        """Test the windows at the first place of a period, which do not overlap."""
-        chosen = np.arange(-series % self._places, len(usable), self._places)
+        """Test the windows at one place of a period, which do not overlap, and at two."""
+        distance = self._places // self._parts
+        chosen = np.arange(-series % distance, len(usable), distance)
         chosen = chosen[usable[chosen]]
         if not chosen.size:
             return
@@ -310,7 +321,11 @@ class LineStage(StatefulBase):
             signals[role][chosen, :lines] for role in ("output", method.denominator, method.reference)
         )
         pair = np.stack([times(output, reference.conj()), times(denominator, reference.conj())])
-        change.process(pair, centre[0, chosen], centre[1, chosen], sample[chosen])
+        variation.process(pair, centre[0, chosen], centre[1, chosen], sample[chosen])
+        first = (series + chosen) % self._places == 0
+        if first.any():
+            chosen = chosen[first]
+            change.process(pair[:, first], centre[0, chosen], centre[1, chosen], sample[chosen])
 
     def _detected(self, signals: dict[Role, Complex]) -> Floats | None:
         """Noise of one window by the detection lines, as a power of numerator·conj(reference); None without them."""
