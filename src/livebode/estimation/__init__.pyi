@@ -17,8 +17,8 @@ from livebode.estimation.moving_periods import MovingPeriods as MovingPeriods
 from livebode.estimation.moving_periods import PeriodClock as PeriodClock
 from livebode.estimation.nonperiodic_stage import separable as separable
 from livebode.estimation.nonperiodic_tracker import NonPeriodicTracker as NonPeriodicTracker
-from livebode.estimation.periods import Periods as Periods
 from livebode.estimation.periodic_variation import PeriodicVariation as PeriodicVariation
+from livebode.estimation.periods import Periods as Periods
 from livebode.estimation.quantities import convert as convert
 from livebode.estimation.quotient import WINDOW_MIN as WINDOW_MIN
 from livebode.estimation.quotient import LocalPolynomial as LocalPolynomial
@@ -50,8 +50,8 @@ from livebode.estimation.tracker_settings import default_hop as default_hop
 from livebode.estimation.tracker_settings import divisors as divisors
 from livebode.estimation.tracker_settings import nearest_hop as nearest_hop
 from livebode.estimation.tracker_settings import quarter_hop as quarter_hop
-from livebode.estimation.trend import SignalTrend as SignalTrend
 from livebode.estimation.trend import RepeatedSpikes as RepeatedSpikes
+from livebode.estimation.trend import SignalTrend as SignalTrend
 from livebode.estimation.trend import TrendStretch as TrendStretch
 from livebode.estimation.trend import TurningSpikes as TurningSpikes
 from livebode.estimation.uneven import UnevenSpectra as UnevenSpectra
