@@ -13,8 +13,8 @@ _KINDS = {
     "roles-doubtful", "transient", "outlying-periods", "phase-slip", "phase-slips", "restart", "replaced",
     "computer-clock", "foreign", "backlog", "backlog-cleared", "waiting", "window-doubtful",
     "drift", "response-changes", "periodic-variation", "not-periodic", "distortion-levels", "best-linear-approximation",
-    "recordings-differ", "uneven-clock", "long-recording", "trend-subtracted", "spikes-subtracted", "signal-drifts", "unwrapped",
-    "suppressed", "sink-down", "sink-up", "sink-full", "sink-refused",
+    "recordings-differ", "uneven-clock", "long-recording", "trend-subtracted", "spikes-subtracted", "signal-drifts",
+    "unwrapped", "suppressed", "sink-down", "sink-up", "sink-full", "sink-refused",
 }  # fmt: skip
 _ONCE = {"foreign", "suppressed"}
 _PERCENT_EVERY_S = 0.2
