@@ -90,7 +90,7 @@ def averaged(of: Recording, *, average: bool) -> tuple[Response, Drift]:
     return mean.response()[0], mean.drift.result()
 
 
-def row(case: Callable[[np.random.Generator], Course], average: bool, seeds: range) -> tuple[str | float, ...]:
+def row(case: Callable[[np.random.Generator], Course], average: bool, seeds: range) -> tuple[str, ...]:
     """A row of the table, by `HEADER`."""
     reported, within, width, noise, variation = 0, [], [], [], []
     noise_of_mean = NOISE * np.sqrt(4 / WINDOW / PERIODS)
@@ -119,11 +119,6 @@ def row(case: Callable[[np.random.Generator], Course], average: bool, seeds: ran
     )
 
 
-def table(runs: int, seed: int) -> list[tuple[str | float, ...]]:
-    """All rows."""
-    return [row(case, average, range(seed, seed + runs)) for case in CASES for average in (False, True)]
-
-
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -131,8 +126,11 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1000)
     options = parser.parse_args()
     print(f"{options.runs} recordings a case, of {PERIODS} periods, {len(LINES)} lines")
-    for cells in (HEADER, *table(options.runs, options.seed)):
-        print("  ".join(f"{cell:>9}" for cell in cells), flush=True)
+    print("  ".join(f"{cell:>9}" for cell in HEADER))
+    seeds = range(options.seed, options.seed + options.runs)
+    for case in CASES:
+        for average in (False, True):
+            print("  ".join(f"{cell:>9}" for cell in row(case, average, seeds)), flush=True)
 
 
 if __name__ == "__main__":
