@@ -13,6 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import livebode
 from livebode.core import Lines, Responses
 from livebode.pictures import (
     Band,
@@ -158,3 +159,12 @@ def test_a_picture_that_cannot_be_written_leaves_the_previous_ones(tmp_path: Pat
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
     assert [path.read_bytes() for path in sorted(tmp_path.iterdir())] == before
+
+
+def test_the_parts_of_a_bound_are_drawn_within_it_where_more_than_noise_is_known() -> None:
+    mean = livebode.example_responses().mean()
+    varied = replace(mean, sigma=2 * mean.sigma, variation=np.sqrt(3) * mean.sigma)
+    plain, parts = (bode_figure(Responses.of(each), mean=each) for each in (mean, varied))
+    names = [[mark.name for mark in figure.panels[0].marks if hasattr(mark, "name")] for figure in (plain, parts)]
+    assert ("part" in names[0], names[1].count("part")) == (False, 1)
+    assert [entry.text for entry in parts.key][1:] == ["noise", "time variation"]

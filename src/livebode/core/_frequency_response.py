@@ -106,7 +106,10 @@ measured line; the nearest are 50 and 60 Hz
         sigma² = noise² + distortion² + variation²; a part that is not known counts as zero.
         """
         others = [np.where(np.isfinite(part), part, 0.0) for part in (self.distortion, self.variation)]
-        return np.asarray(np.sqrt(np.maximum(self.sigma**2 - others[0] ** 2 - others[1] ** 2, 0.0)))
+        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+            shares = [(part / self.sigma) ** 2 for part in others]  # the squares of huge values would overflow
+            of_noise = self.sigma * np.sqrt(np.maximum(1 - shares[0] - shares[1], 0.0))
+        return np.asarray(np.where(self.sigma > 0, of_noise, self.sigma))
 
     @property
     def magnitude_db(self) -> Floats:

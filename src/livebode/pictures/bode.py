@@ -68,7 +68,14 @@ def bode_figure(
     x = frequency_scale(responses.lines.frequency_hz)
     run = (None, None, None) if mean else (summary.magnitude_db, summary.phase_deg, summary.coherence)
     newest = _newest_db(summary), _newest_deg(summary), _newest_coherence(summary)
-    marks = [_marks(summary, of, *values) for of, values in zip(run, newest)]
+    parts_of_bound = _parts(summary)
+    inner: list[list[tuple[str, tuple[Floats, Floats]]]] = [
+        [(colour, bound_db(summary.newest_value, radius)) for _, colour, radius in parts_of_bound[1:]],
+        [(colour, _around(summary, radius)) for _, colour, radius in parts_of_bound[1:]],
+        [],
+    ]
+    outer = parts_of_bound[0][1]
+    marks = [_marks(summary, of, *values, outer, within) for of, values, within in zip(run, newest, inner)]
     if curve is not None:
         for panel, values in zip(marks, curve[1:]):
             panel.append(Trace("fit", curve[0], values, LIGHT.ink, 1.0, "dashed"))
@@ -111,8 +118,35 @@ def _newest_db(summary: Summary) -> tuple[Floats, Floats, Floats]:
 
 
 def _newest_deg(summary: Summary) -> tuple[Floats, Floats, Floats]:
-    half = bound_deg(summary.newest_value, summary.newest_bound)
-    return summary.newest_phase_deg, summary.newest_phase_deg - half, summary.newest_phase_deg + half
+    return summary.newest_phase_deg, *_around(summary, summary.newest_bound)
+
+
+def _around(summary: Summary, radius: Floats) -> tuple[Floats, Floats]:
+    """Ends of the phase, degrees."""
+    half = bound_deg(summary.newest_value, radius)
+    return summary.newest_phase_deg - half, summary.newest_phase_deg + half
+
+
+def _parts(summary: Summary) -> list[tuple[str, str, Floats]]:
+    """What the bound covers, the whole first: words, colour, and radius of this part and those after it, (lines,).
+
+    Only noise where no other part is known.
+    """
+    bound, newest = summary.newest_bound, summary.newest
+    found = [(tr("noise"), LIGHT.newest, bound)]
+    if newest is None:
+        return found
+    distortion, variation = (np.where(np.isfinite(part), part, 0.0) for part in (newest.distortion, newest.variation))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        unit = np.where(newest.sigma > 0, bound / newest.sigma, 0.0)
+    sigma = newest.noise
+    found = [(tr("noise"), LIGHT.newest, unit * sigma)]
+    others = (tr("distortion"), LIGHT.traces[3], distortion), (tr("time variation"), LIGHT.traces[2], variation)
+    for text, colour, part in others:
+        if (part > 0).any():
+            sigma = np.hypot(sigma, part)
+            found.insert(0, (text, colour, unit * sigma))
+    return found
 
 
 def _newest_coherence(summary: Summary) -> tuple[Floats, Floats, Floats]:
@@ -122,8 +156,19 @@ def _newest_coherence(summary: Summary) -> tuple[Floats, Floats, Floats]:
     return np.where(np.isfinite(summary.newest_value), summary.newest.coherence, np.nan), nothing, nothing
 
 
-def _marks(summary: Summary, run: Floats | None, value: Floats, low: Floats, high: Floats) -> list[Mark]:
-    """One panel: range, median, newest; `run` is (3, lines) or None, the others (lines,)."""
+def _marks(
+    summary: Summary,
+    run: Floats | None,
+    value: Floats,
+    low: Floats,
+    high: Floats,
+    colour: str,
+    inner: list[tuple[str, tuple[Floats, Floats]]],
+) -> list[Mark]:
+    """One panel: range, median, newest; `run` is (3, lines) or None, the others (lines,).
+
+    The bound has this colour; `inner` are the parts within it, from the outside.
+    """
     f = summary.responses.lines.frequency_hz
     few = len(f) <= FEW_LINES
     marks: list[Mark] = []
@@ -135,8 +180,12 @@ def _marks(summary: Summary, run: Floats | None, value: Floats, low: Floats, hig
     if few:
         if run is None:
             marks.append(Trace("mean", f, value, LIGHT.newest, 0.8))
-        return [*marks, Bars("bound", f, low, high, LIGHT.newest), Dots("newest", f, value, LIGHT.newest, 4.5, "dash")]
-    return [*marks, Band("bound", f, low, high, LIGHT.newest, 0.28), Trace("newest", f, value, LIGHT.newest, 0.9)]
+        marks.append(Bars("bound", f, low, high, colour))
+        marks += [Bars("part", f, *ends, each, 1.6 + 1.6 * n) for n, (each, ends) in enumerate(inner, 1)]
+        return [*marks, Dots("newest", f, value, LIGHT.newest, 4.5, "dash")]
+    marks.append(Band("bound", f, low, high, colour, 0.28))
+    marks += [Band("part", f, *ends, each, 0.45) for each, ends in inner]
+    return [*marks, Trace("newest", f, value, LIGHT.newest, 0.9)]
 
 
 def _key(summary: Summary, fit: bool, mean: bool) -> list[Entry]:
@@ -153,6 +202,8 @@ def _key(summary: Summary, fit: bool, mean: bool) -> list[Entry]:
     average = tr("average, bound: {percent:g} %", percent=100 * COVERAGE)
     few = len(summary.responses.lines) <= FEW_LINES
     entries.append(Entry(average if mean else newest, LIGHT.newest, "bar" if few else "line"))
+    if len(parts := _parts(summary)) > 1:
+        entries += [Entry(text, colour, "bar" if few else "band") for text, colour, _ in reversed(parts)]
     if fit:
         entries.append(Entry(tr("its fit") if mean else tr("newest fit"), LIGHT.ink, "dashed"))
     return entries

@@ -16,6 +16,7 @@ from livebode.core import (
     Part,
     Picture,
     PrintedTable,
+    Response,
     Section,
     moment,
     with_bound,
@@ -59,11 +60,35 @@ def response(of: ReportData) -> Section:
     mean = of.shown.mean
     frequency = mean.lines.frequency_hz
     rows = [
-        (number(f, "g"), *polar, number(c, ".4f") if isfinite(c) else "—", share(n, of.of.count))
-        for f, polar, c, n in zip(frequency, polar_rows(mean), mean.coherence, of.of.valid)
+        (number(f, "g"), *polar, number(c, ".4f") if isfinite(c) else "—", *parts, share(n, of.of.count))
+        for f, polar, c, parts, n in zip(frequency, polar_rows(mean), mean.coherence, _parts(mean), of.of.valid)
     ]
-    headings = ("Hz", f"dB{_re(mean.unit)}", "± dB", tr("degrees"), tr("± degrees"), tr("coherence γ²"), tr("valid"))
+    headings: tuple[str, ...] = (
+        "Hz",
+        f"dB{_re(mean.unit)}",
+        "± dB",
+        tr("degrees"),
+        tr("± degrees"),
+        tr("coherence γ²"),
+    )
+    of_parts = (tr("noise, %"), tr("distortion, %"), tr("time variation, %"))
+    headings = *headings, *(of_parts if _has_parts(mean) else ()), tr("valid")
     return Section(tr("Frequency response"), (line_table(headings, rows),))
+
+
+def _has_parts(response: Response) -> bool:
+    """Whether more than noise is known in sigma."""
+    return any(bool((np.isfinite(part) & (part > 0)).any()) for part in (response.distortion, response.variation))
+
+
+def _parts(response: Response) -> list[tuple[str, ...]]:
+    """Standard deviations of noise, distortion and time variation at each line, in percent of the response."""
+    if not _has_parts(response):
+        return [()] * len(response.lines)
+    parts = response.noise, response.distortion, response.variation
+    with np.errstate(invalid="ignore", divide="ignore"):
+        shares = [100 * part / np.abs(response.value) for part in parts]
+    return [tuple(number(x, ".2g") if isfinite(x) else "—" for x in row) for row in zip(*shares)]
 
 
 def tracking(of: ReportData) -> Section:
