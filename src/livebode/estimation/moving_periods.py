@@ -163,7 +163,8 @@ def in_motion(line_hz: float, share: float, speed: float, unit: str) -> tuple[Me
     """Why a line is invalid while the machine moves: for an Event, and its details."""
     message = Message(
         "distortion may be {percent:.0f}% of the response at {line_hz:g} Hz while the machine moves at {speed:.3g} "
-        "{unit}/s (friction that reverses, or backlash: reduce the excitation, or move faster); the line is not valid",
+        "{unit}/s (friction that reverses: move faster or reduce the excitation; backlash: increase the excitation); "
+        "the line is not valid",
         percent=100 * share,
         line_hz=line_hz,
         speed=speed,
