@@ -207,6 +207,7 @@ class DriftTest(StatefulBase):
         "_begin",
         "_average",
         "_value",
+        "_weight",
         "_share",
     )
 
@@ -222,6 +223,7 @@ class DriftTest(StatefulBase):
         self._begin = np.full(3, np.nan)  # first and newest sample, and time, of the first window
         self._average = np.full(2, np.nan)  # time and schedule of the newest average
         self._value = np.full(n, complex(np.nan, np.nan))  # of that
+        self._weight = np.ones(n, dtype=np.complex128)  # of the first window
         self._share = 1.0  # of the newest window in that
 
     def add(self, part: Responses) -> None:
@@ -255,6 +257,7 @@ class DriftTest(StatefulBase):
         self._begin = np.array([window.first, window.sample, window.time_s])
         self._average = np.array([window.time_s, window.schedule])
         self._value = np.where(window.valid, window.value, np.nan)
+        self._weight = np.where(np.isfinite(window.weight), window.weight, 1.0)
 
     def _add_gained(self, averages: Responses) -> None:
         """Add the windows that these averages gained, all at one place in the period."""
@@ -271,7 +274,7 @@ class DriftTest(StatefulBase):
             self._average, self._value, self._share = now, value, float(share)
         if values:
             time_s, schedule = np.array(moments).T
-            self._add(time_s, schedule, np.array(values), np.ones((len(values), self._value.size)))
+            self._add(time_s, schedule, np.array(values), np.tile(self._weight, (len(values), 1)))
 
     def _add(self, time_s: Floats, schedule: Floats, value: Complex, weight: Complex | Floats) -> None:
         """Add windows; `value` is NaN where it is invalid, shape (windows, lines)."""
