@@ -284,12 +284,22 @@ def trend_text(found: Sequence[ChannelTrend], channels: Sequence[Channel]) -> st
 
 
 def _sentence(drift: ChannelTrend, unit: str) -> Message:
+    facts = {
+        "channel": repr(drift.channel),
+        "step": max(abs(drift.step), drift.wander),
+        "unit": unit,
+        "line_hz": drift.line_hz,
+    }
+    if drift.share > 1:
+        return Message(
+            "{channel} drifts by {step:.3g}{unit} from window to window, which adds {times:.3g} times its size to the "
+            "line at {line_hz:.6g} Hz",
+            times=drift.share,
+            **facts,
+        )
     return Message(
-        "{channel} drifts by {step:.3g}{unit} from window to window, which adds {share_percent:,.3g} % to the line at "
+        "{channel} drifts by {step:.3g}{unit} from window to window, which adds {share_percent:.2g} % to the line at "
         "{line_hz:.6g} Hz",
-        channel=repr(drift.channel),
-        step=max(abs(drift.step), drift.wander),
-        unit=unit,
         share_percent=100 * drift.share,
-        line_hz=drift.line_hz,
+        **facts,
     )
