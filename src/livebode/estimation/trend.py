@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -116,10 +117,12 @@ class SignalTrend:
     def of(self, names: Sequence[str | None], start: int, stop: int) -> Floats:
         """Trend of these channels at the samples start … stop − 1, (channels, samples)."""
         known = np.zeros((len(self.channels) + 1, stop - start))
-        for stretch in self.stretches:
+        begun = bisect_right(self.stretches, start, key=lambda stretch: stretch.stop)
+        for stretch in self.stretches[begun:]:
+            if stretch.first >= stop:
+                break
             first, last = max(start, stretch.first), min(stop, stretch.stop)
-            if first < last:
-                known[:-1, first - start : last - start] = stretch.at(np.arange(first, last, dtype=np.float64))
+            known[:-1, first - start : last - start] = stretch.at(np.arange(first, last, dtype=np.float64))
         rows = [self.channels.index(name) if name in self.channels else -1 for name in names]
         return np.asarray(known[rows])
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from livebode.arrays import Complex, Flags, Floats
+from livebode.arrays import Complex, Flags, Floats, Integers
 from livebode.core import Block, Channel, Event, Lines
 from livebode.dataclass import dataclass
 from livebode.estimation import Settings, SignalTrend, TrendStretch
@@ -53,13 +53,12 @@ class ChannelTrend:
     line_hz: float
 
 
-class _Period(NamedTuple):
-    """A whole period: its number, whether it follows the one before it, means and lines of the channels."""
+class _Periods(NamedTuple):
+    """Whole periods: their numbers, which of them follow the one before, and means of the channels (periods, names)."""
 
-    number: int
-    follows: bool
-    mean: Floats
-    lines: Complex | None
+    number: Integers
+    follows: Flags
+    means: Floats
 
 
 class TrendSearch:
@@ -83,7 +82,8 @@ class TrendSearch:
         self.channels = list(dict.fromkeys([*self.names, *([settings.schedule] if settings.schedule else [])]))
         self._settings, self._first, self._window = settings, first, settings.lines.window
         self._excited = excited_bins(settings)
-        self._periods: list[_Period] = []
+        self._periods: list[_Periods] = []
+        self._lines: list[Complex] = []  # of the first periods, (names, lines)
         self._rows, self._stop = np.zeros((len(self.channels), 0)), first
         self._unused, self._follows = 0, False  # samples of `_rows` before a period; whether one was just before it
         self._schedule: list[Floats] = []
@@ -99,42 +99,40 @@ class TrendSearch:
         used = self._rows[:, self._unused : self._unused + count * self._window]
         number = (self._stop - self._rows.shape[1] + self._unused - self._first) // self._window
         self._rows, self._unused = self._rows[:, self._unused + count * self._window :], 0
-        periods = used.reshape(len(self.channels), count, self._window).swapaxes(0, 1)
-        for i, period in enumerate(periods):
-            self._add(number + i, period)
+        self._add(number, used.reshape(len(self.channels), count, self._window).swapaxes(0, 1))
 
     def _begin(self, unused: int) -> None:
         self._rows, self._unused, self._follows = self._rows[:, :0], unused, False
 
-    def _add(self, number: int, period: Floats) -> None:
-        examined = period[: len(self.names)]
-        if not np.isfinite(examined).all():
-            self._follows = False
-            return
-        few = len(self._periods) < _SPECTRA
-        self._periods.append(
-            _Period(number, self._follows, examined.mean(axis=1), spectra(examined, self._excited) if few else None)
-        )
-        if few and len(period) > len(self.names):
-            self._schedule.append(period[-1])
-        self._follows = True
+    def _add(self, number: int, periods: Floats) -> None:
+        """Add consecutive periods, (periods, channels, samples)."""
+        examined = periods[:, : len(self.names)]
+        known = np.asarray(np.isfinite(examined).all(axis=(1, 2)))
+        follows = np.append(self._follows, known[:-1])[known]
+        self._follows = bool(known[-1])
+        examined = examined[known]
+        self._periods.append(_Periods(number + np.flatnonzero(known), follows, examined.mean(axis=2)))
+        few = _SPECTRA - len(self._lines)
+        self._lines += [spectra(period, self._excited) for period in examined[:few]]
+        if self._settings.schedule and self._settings.schedule not in self.names:
+            self._schedule += list(periods[known][:few, -1])
 
     def finish(self, transient: int = 0) -> list[ChannelTrend]:
         """The channels whose drift matters behind the transient, in periods; none for a machine that moves."""
         if self._schedule and moves(np.concatenate(self._schedule), self._window):
             return []
-        periods = [period for period in self._periods if period.number >= transient]
-        if len(periods) < 2:
+        if not self._periods:
             return []
-        follows = np.array([period.follows for period in periods[1:]])
-        steps = np.diff([period.mean for period in periods], axis=0)[follows]
-        compared = [period.lines for period in periods if period.lines is not None]
-        if not len(steps) or len(compared) < 2:
+        number, follows, means = (np.concatenate(parts) for parts in zip(*self._periods))
+        steady = number >= transient
+        lines = np.array(self._lines)[steady[: len(self._lines)]]
+        means, follows = means[steady], follows[steady][1:]
+        steps = np.diff(means, axis=0)
+        if not follows.any() or len(lines) < 2:
             return []
-        lines = np.array(compared)
-        own = np.diff([period.mean for period in periods[: len(lines)]], axis=0)
+        own, near = steps[: len(lines) - 1], follows[: len(lines) - 1]
         found = (
-            self._judged(name, steps[:, i], own[:, i], lines[:, i], follows[: len(own)], len(periods))
+            self._judged(name, steps[follows, i], own[:, i], lines[:, i], near, len(means))
             for i, name in enumerate(self.names)
         )
         return [one for one in found if one is not None]
@@ -286,12 +284,22 @@ def trend_text(found: Sequence[ChannelTrend], channels: Sequence[Channel]) -> st
 
 
 def _sentence(drift: ChannelTrend, unit: str) -> Message:
+    facts = {
+        "channel": repr(drift.channel),
+        "step": max(abs(drift.step), drift.wander),
+        "unit": unit,
+        "line_hz": drift.line_hz,
+    }
+    if drift.share > 1:
+        return Message(
+            "{channel} drifts by {step:.3g}{unit} from window to window, which adds {times:.3g} times its size to the "
+            "line at {line_hz:.6g} Hz",
+            times=drift.share,
+            **facts,
+        )
     return Message(
-        "{channel} drifts by {step:.3g}{unit} from window to window, which adds {share_percent:,.3g} % to the line at "
+        "{channel} drifts by {step:.3g}{unit} from window to window, which adds {share_percent:.2g} % to the line at "
         "{line_hz:.6g} Hz",
-        channel=repr(drift.channel),
-        step=max(abs(drift.step), drift.wander),
-        unit=unit,
         share_percent=100 * drift.share,
-        line_hz=drift.line_hz,
+        **facts,
     )

@@ -106,7 +106,8 @@ class WrapSearch:
             return None
         for turn in _turns(channel, self._whole):
             margin = _NEAR * ordinary + _ROUNDING * turn
-            near = float(np.abs(jumps - turn).max()) <= margin
+            apart = np.abs(jumps - turn)
+            near = float(apart.max()) <= margin and float(np.median(apart)) <= margin / 2
             fits = extent <= turn + margin / 4 and ordinary < _OF_TURN * turn
             if near and fits and (channel.unit == "rad" or self._is_between_borders(turn, margin)):
                 return Wrap(turn * channel.factor, int(jumps.size))
