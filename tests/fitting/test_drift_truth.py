@@ -162,3 +162,23 @@ def test_bursts_of_noise_are_no_change_of_the_machine() -> None:
         test.add(replace(responses, value=value))
         alarms += test.result().significant
     assert alarms <= 4
+
+
+def test_averages_over_all_periods_have_the_drift_of_their_windows() -> None:
+    """Whatever the strength of the input is: the windows are those that the averages gained."""
+    responses, _ = record(np.random.default_rng(6), 40, 0.1)
+    responses = replace(responses, weight=np.full(responses.value.shape, 300 * np.exp(0.7j)))
+    count = np.arange(1, 41)
+    averages = replace(
+        responses,
+        value=np.cumsum(responses.value, axis=0) / count[:, np.newaxis],
+        first=np.zeros(40, dtype=np.int64),
+        time_s=np.cumsum(responses.time_s) / count,
+    )
+    of_windows, of_averages = DriftTest(LINES), DriftTest(LINES)
+    of_windows.add(responses)
+    of_averages.add(averages)
+    expected, found = of_windows.result(), of_averages.result()
+    assert found.significant
+    for name in ("value", "change", "begin", "end"):
+        np.testing.assert_allclose(getattr(found, name), getattr(expected, name), rtol=1e-9)
