@@ -221,7 +221,7 @@ def _row(left: Floats, kernel: Floats) -> tuple[Integers, float]:
 
 def _fitted(rest: Floats, places: Integers, kernel: Floats) -> tuple[Floats, Floats]:
     """Sizes of spikes at these places by least squares, and what remains."""
-    sizes = np.linalg.lstsq(kernel[np.subtract.outer(places, places)], rest[places])[0]
+    sizes = np.asarray(np.linalg.lstsq(kernel[np.subtract.outer(places, places)], rest[places])[0], dtype=np.float64)
     impulses = np.zeros(rest.size)
     impulses[places] = sizes
     return sizes, rest - np.fft.irfft(np.fft.rfft(impulses) * np.fft.rfft(kernel), rest.size)
