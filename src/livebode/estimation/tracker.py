@@ -177,8 +177,8 @@ class Tracker(StreamEstimator[InputStatistics]):
         if self._trend is not None:
             channels = channels - self._trend.of([s.channel(role) for role in self._roles], block.start, stop)
         for spikes in self._sensor_spikes:
-            rows = [[s.channel(role) == spikes.channel] for role in self._roles]
-            channels = channels - np.where(rows, spikes.of(block.start, stop), 0.0)
+            spoiled = [[s.channel(role) == spikes.channel] for role in self._roles]
+            channels = channels - np.where(spoiled, spikes.of(block.start, stop), 0.0)
         if self._watch.starts(block):
             self._spectra.restart(block.start)
             self._centre.restart()

@@ -32,6 +32,7 @@ _SMALL = 3.5  # robust standard deviations of what is explained by spikes, besid
 _OF_SIGNAL = 1e-5  # smaller spikes change no digit that is shown
 _MOST, _MOST_TRIED, _SHARE_MAX = 24, 64, 1 / 50  # samples of a period, and of all: more are no spikes
 _ROW_MAX, _LONGER = 4, 0.1  # samples in a row, and what each more has to explain, relative to the first
+_MEDIAN, _NOISY, _ABOVE = 1.25, 3.0, 5.0  # noise of a median over a mean's, and what remains over it; spikes over that
 _FREE_MIN = 0.25  # of the bins: with fewer beside the lines, a spike cannot be told from the response
 _GAUSS_90 = 1.645  # of a Gaussian, |x| in standard deviations that nine of ten samples are below
 _NEAR, _HIGH_OF_ONE = 4, 8.0  # samples on each side to compare with, and robust standard deviations of a sample
@@ -184,14 +185,20 @@ def repeated_spikes(blocks: Floats, excited: np.ndarray) -> tuple[Integers, Floa
     least = _OF_SIGNAL * float(typical.std())
     kernel = np.fft.irfft(free.astype(np.float64), window)
     most, places, sizes, left = min(max(_MOST, round(_SHARE_MAX * window)), _MOST_TRIED), nothing[0], nothing[1], rest
+    noise = _MEDIAN * _usual(blocks - typical) * float(np.sqrt(free.mean() / len(blocks)))
+    least_found = np.inf
     while True:
         row, size = _row(left, kernel)
         if size <= max(_high(window) * _deviation(left), least):
             break
+        least_found = min(least_found, size)
         before, places = places.size, np.union1d(places, row)
         if places.size == before or places.size > most:
             return nothing
         sizes, left = _fitted(rest, places, kernel)
+    # What a nonlinear machine distorts has peaks of all sizes, and no noise below them.
+    if _deviation(left) > _NOISY * noise and least_found <= _ABOVE * np.abs(left).max():
+        return nothing
     large = np.abs(sizes) > max(_SMALL * _deviation(left), least / 10)
     return (places[large], _fitted(rest, places[large], kernel)[0]) if large.any() else nothing
 
@@ -214,7 +221,7 @@ def _row(left: Floats, kernel: Floats) -> tuple[Integers, float]:
 
 def _fitted(rest: Floats, places: Integers, kernel: Floats) -> tuple[Floats, Floats]:
     """Sizes of spikes at these places by least squares, and what remains."""
-    sizes = np.linalg.lstsq(kernel[np.subtract.outer(places, places)], rest[places])[0]
+    sizes = np.asarray(np.linalg.lstsq(kernel[np.subtract.outer(places, places)], rest[places])[0], dtype=np.float64)
     impulses = np.zeros(rest.size)
     impulses[places] = sizes
     return sizes, rest - np.fft.irfft(np.fft.rfft(impulses) * np.fft.rfft(kernel), rest.size)
@@ -230,12 +237,17 @@ def turning_spikes(blocks: Floats) -> tuple[Integers, Floats]:
     apart = (blocks - np.median(blocks, axis=0)).ravel()
     padded = np.pad(apart, _NEAR, mode="edge")
     apart = apart - np.median(np.lib.stride_tricks.sliding_window_view(padded, 2 * _NEAR + 1), axis=1)
-    deviation = float(np.quantile(np.abs(apart), 0.9)) / _GAUSS_90  # many are 0 with wide steps
+    deviation = _usual(apart)
     samples = np.flatnonzero(np.abs(apart) > _HIGH_OF_ONE * deviation)
     periods = np.unique(samples // blocks.shape[1]).size
     if deviation == 0 or periods <= _FEW * len(blocks) or samples.size > _SHARE_MAX * apart.size:
         return np.zeros(0, dtype=np.int64), np.zeros(0)
     return samples, apart[samples]
+
+
+def _usual(x: Floats) -> float:
+    """Standard deviation without the largest tenth; with wide steps, most of the values are 0."""
+    return float(np.quantile(np.abs(x), 0.9)) / _GAUSS_90
 
 
 def _deviation(x: Floats) -> float:

@@ -126,7 +126,7 @@ def _check_sign(curve: FrictionCurve, name: str) -> None:
         "friction-negative",
         f"the friction is negative: Coulomb {coulomb}, viscous {viscous}; the input {name!r} has the other sign, or is "
         "not what moves the axis",
-        f"give --input {quoted}, or name the channel of the torque",
+        f"give the input {quoted}, or name the channel of the torque",
         argument="input",
         value=name,
         coulomb=curve["coulomb"],

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from livebode.cli import From, Json, NextCommand, Rate, Time, To, console, results_directory
-from livebode.core import OutputError, writing
+from livebode.core import OutputError, SignalError, writing
 from livebode.locations import location
 
 if TYPE_CHECKING:
@@ -71,7 +71,11 @@ def friction_command(
         location(target), input=input, position=position, velocity=velocity, rate_hz=rate, time=time,
         part=motion_part(from_, to),
     )  # fmt: skip
-    report = friction_of(strokes, places=places, band_hz=band, slowest=slowest)
+    try:
+        report = friction_of(strokes, places=places, band_hz=band, slowest=slowest)
+    except SignalError as error:
+        error.remedy = error.remedy.replace("give the input ", "give --input ")
+        raise
     into = picture or (None if strokes.run is None else results_directory(strokes.run) / "friction.svg")
     if into is not None:
         from livebode_control.strokes.friction_picture import save_friction_picture
