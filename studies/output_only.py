@@ -3,7 +3,8 @@
 Run `python -m studies.output_only` (`--runs 40`). The machine is a state-space model: modes of a speed beside the rigid
 motion of a mass with viscous friction, both under one force, and noise of a sensor. A run has five windows. The table
 has the runs with exactly one curve for each mode, the share of the windows in which a mode was found, and the share of
-the errors in the bounds.
+the errors in the bounds. A second table has windows of a mode that are taken for a harmonic or a moving tone, and
+windows of a sweep of the force, through a resonance at 67 Hz, in which the tone is found.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from threadpoolctl import threadpool_limits
 
 from livebode import Block
 from livebode.core import Parameters
-from livebode_modes import ModeTracker, OutputOnlySettings, Tracks, lost_samples, reduced
+from livebode_modes import ModeTracker, OutputOnlySettings, Tracks, WindowModes, lost_samples, reduced
 from studies.common import Floats
 
 WINDOWS, HOPS = 5, 20
@@ -51,6 +52,7 @@ class Result:
     errors: Floats
 
 
+SLOPES_HZ_S = 0.25, 0.5, 1.0, 3.0
 DAMPINGS = 0.005, 0.01, 0.02, 0.03, 0.05, 0.07, 0.1
 BELT = Case("", ((67.0, 0.02),))
 CASES = (
@@ -113,6 +115,35 @@ def tracked(y: Floats, of: OutputOnlySettings) -> list[Parameters]:
     return [Parameters.join(parts) for name, parts in rows.items() if name.startswith("mode")]
 
 
+def windows_of(y: Floats, of: OutputOnlySettings) -> list[WindowModes]:
+    """Windows that share no samples, each of the whole recording `y` cut into parts."""
+    samples = of.window + of.lags * of.factor + 2 * lost_samples(of.factor)
+    parts = [y[i : i + samples] for i in range(0, y.size - samples + 1, samples)]
+    with threadpool_limits(1):
+        return [ModeTracker(of).process(Block(np.atleast_2d(part), list(of.outputs), of.rate_hz))[0] for part in parts]
+
+
+def misnamed(damping: float, runs: int) -> tuple[int, int, int]:
+    """Windows of a mode under noise: taken for a harmonic, for a moving tone, and all."""
+    of = OutputOnlySettings(("y",), 250.0, (40.0, 100.0), 1)
+    pole = np.exp(2 * np.pi * 67 * complex(-damping, np.sqrt(1 - damping**2)) / of.rate_hz)
+    force = np.random.default_rng(SEED).standard_normal((of.window + of.lags) * runs + 2000)
+    y = lfilter([1.0, -1.0], [1.0, -2 * pole.real, abs(pole) ** 2], force)[2000:]
+    found = windows_of(y + 0.01 * y.std() * np.random.default_rng(SEED + 1).standard_normal(y.size), of)
+    return sum(bool(w.harmonics) for w in found), sum(w.tone is not None for w in found), len(found)
+
+
+def swept(slope_hz_s: float) -> tuple[int, int]:
+    """Windows of a sweep from 45 to 95 Hz: with the tone found, and all."""
+    of = OutputOnlySettings(("y",), 250.0, (40.0, 100.0), 1)
+    t = np.arange(round(50 / slope_hz_s * of.rate_hz)) / of.rate_hz
+    pole = np.exp(2 * np.pi * 67 * complex(-0.02, 1) / of.rate_hz)
+    force = np.sin(2 * np.pi * (45 + slope_hz_s / 2 * t) * t)
+    y = lfilter([1.0, -1.0], [1.0, -2 * pole.real, abs(pole) ** 2], force)
+    found = windows_of(y + 0.05 * np.random.default_rng(SEED).standard_normal(y.size), of)
+    return sum(w.tone is not None for w in found), len(found)
+
+
 def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--runs", type=int, default=40, help="of each case [default: 40]")
@@ -122,7 +153,19 @@ def main(arguments: list[str] | None = None) -> int:
     print("|---|---|---|---|---|---|---|---|---|")
     for case in CASES:
         print(row(case, measure(case, runs)), flush=True)
+    print_tones(runs)
     return 0
+
+
+def print_tones(runs: int) -> None:
+    """The second table."""
+    print("\n| windows of | taken for a harmonic | taken for a moving tone |\n|---|---|---|")
+    for damping in DAMPINGS:
+        harmonics, tones, windows = misnamed(damping, 2 * runs)
+        print(f"| a mode, damping {100 * damping:g} % | {harmonics} of {windows} | {tones} of {windows} |", flush=True)
+    for slope_hz_s in SLOPES_HZ_S:
+        found, windows = swept(slope_hz_s)
+        print(f"| a sweep of {slope_hz_s:g} Hz/s | | {found} of {windows} |", flush=True)
 
 
 def row(case: Case, result: Result) -> str:

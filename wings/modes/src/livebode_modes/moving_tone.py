@@ -11,7 +11,7 @@ from livebode.dataclass import dataclass
 with needing("SciPy", "analysis", "a run from the outputs alone"):
     import scipy  # its parts are loaded when they are first used
 
-SHARE_MIN = 0.6
+SHARE_MIN = 0.7
 """Least share of the power in the band that the tone has in a segment."""
 _DIVISIONS = 4, 2  # a segment is this part of the window; the longer ones show slower tones
 _MOVED_MIN = 3.0  # resolutions of a segment over the window: a mode stays
