@@ -5,8 +5,9 @@ A structure has 1 … 20 modes between its lines, damping ratios from 0.1 to 5 %
 a rigid body. 40 … 800 lines have noise of 1e-4 … 5e-2 of the response, with a sigma that is known or that of the mean
 of eight periods (7 complex degrees of freedom). A mode is permitted if no unbiased estimate has to have a scatter of
 its damping ratio above 10 % (Cramér and Rao). It is found if a mode of the fit is nearer to its pole than half of its
-half-width; a mode of the fit is false if no mode of the structure is nearer than that, four deviations included. Seeds
-below 1000 are those of development.
+half-width; a mode of the fit is false if it has no mode of the structure of its own that is nearer than that, four
+deviations included, or than one spacing of lines: two modes between the same lines look like one. Seeds below 1000 are
+those of development.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ FIRST, RUNS = 1000, 200
 PERMITTED = 0.1
 NEAR = 0.5
 DOF = 7.0
+HIGHEST = 0.45  # of the rate; a mode above would be an alias between the lines
 DEVIATIONS = 4.0
 
 Floats = NDArray[np.float64]
@@ -99,8 +101,8 @@ def generated(seed: int) -> Structure:
     lines = Lines.parse(f"{first}:{first + count - 1}:1", rate_hz=float(window), window=window)
     low, high = lines.frequency_hz[[0, -1]]
     frequency = rng.uniform(low, high, inside) if rng.random() < 0.5 else low * (high / low) ** rng.random(inside)
-    if rng.random() < 0.5:
-        frequency = np.append(frequency, high * rng.uniform(1.6, 3))
+    if rng.random() < 0.5 and (above := high * rng.uniform(1.6, 3)) < HIGHEST * window:
+        frequency = np.append(frequency, above)
     if rng.random() < 0.2:
         frequency = np.append(frequency, low / 50)
     damping = np.exp(rng.uniform(np.log(0.001), np.log(0.05), frequency.size))
@@ -154,7 +156,8 @@ def judged(structure: Structure) -> Found:
     apart = np.abs(structure.poles[:, np.newaxis] - poles)
     half = NEAR * np.abs(structure.poles.real)[:, np.newaxis]
     rows, _ = paired(apart, np.broadcast_to(half, apart.shape))
-    _, right = paired(apart, half + DEVIATIONS * spread)
+    spacing = 2 * np.pi * float(np.diff(structure.lines.frequency_hz)[0])
+    _, right = paired(apart, np.maximum(half + DEVIATIONS * spread, spacing))
     found = np.isin(np.flatnonzero(permitted), rows)
     return Found(int(permitted.sum()), int(found.sum()), poles.size, poles.size - right.size, spent, fit.status)
 

@@ -220,7 +220,9 @@ def _fit(
         return of
     a1, a0 = of.structure.pairs_of(of.theta).T
     outside, (_, high) = _outside(outputs, a1, a0), 2 * np.pi * outputs.grid.frequency_hz[[0, -1]]
-    far = outside & (np.abs(a0) > (_FAR * high) ** 2)
+    # Above half of the rate a pole would be an alias of one between the lines.
+    alias = (outputs.grid.hold != "none") & (a0 - a1**2 / 4 > (np.pi * outputs.grid.rate_hz) ** 2)
+    far = outside & (alias | (np.abs(a0) > (_FAR * high) ** 2))
     order = np.concatenate([np.flatnonzero(~outside), np.flatnonzero(outside & ~far)])
     pairs, residual = order.size, int(np.count_nonzero(outside & ~far))
     if pairs == of.structure.pairs and residual == of.structure.residual:
