@@ -18,7 +18,7 @@ from studies import arrays
 from studies.arrays import LINES_HZ, PERIOD, SERVO, Signals
 
 SEEDS = 100
-# The test for a drift has a false alarm in one of 100 recordings.
+# The test for a drift has a false alarm in one of 200 recordings.
 pytestmark = pytest.mark.filterwarnings("ignore:frf. the response drifts:livebode.SignalWarning")
 
 

@@ -49,6 +49,7 @@ from livebode.fitting.separable import Outputs as Outputs
 from livebode.fitting.separable import SeparatedFit as SeparatedFit
 from livebode.fitting.separable import pole_price as pole_price
 from livebode.fitting.separable import solve as solve
+from livebode.fitting.time_course import Component as Component
 from livebode.fitting.together import fit_each as fit_each
 from livebode.fitting.transfer import Transfer as Transfer
 from livebode.fitting.two_masses import scan as scan

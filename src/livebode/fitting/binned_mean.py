@@ -290,4 +290,5 @@ def _reduced(
         sample=np.maximum.reduceat(rows.sample, starts),
         time_s=time_s,
         schedule=schedule,
+        variation=np.full(valid.shape, np.nan),  # the scatter within the span contains it
     )

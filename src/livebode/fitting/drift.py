@@ -1,63 +1,184 @@
-"""Whether a machine drifts during a record: a trend of the response at a line that noise does not explain."""
+"""Whether a machine changes during a record: by a trend, settling, a step or periodically, beyond the noise."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Flags, Floats
-from livebode.core import Lines, Response, Responses, Stage, StatefulBase, sum_exceeded
+from livebode.core import Lines, Response, Responses, Stage, StatefulBase
 from livebode.dataclass import dataclass
+from livebode.fitting.time_course import FALSE_ALARM, GROUPS_MIN, Component, Course, Series, components_of
 
-FALSE_ALARM = 0.01
-"""Probability that a record of a machine that does not drift is reported, all lines together."""
-_GROUPS_MAX = 32  # when all are full, neighbours are added: memory does not grow with the record
-_GROUPS_MIN = 6  # with fewer, a trend and its scatter have too few degrees of freedom
-_ROUNDING = 1e-9  # of a response
 _MOVED = 1e-3  # of the largest value of the schedule
-# A trend is at most so far from its middle for the share 1 - 1/e of the record, as noise from its mean within sigma.
-_WITHIN_SIGMA = 1 - np.exp(-1)
+_VALUES_MAX, _GROUPS = 1 << 16, (64, 512)  # when all groups are full, neighbours are added: memory does not grow
+_MOMENTS = 128  # of the record at which the course is evaluated
+_WITHIN = 1 - np.exp(-1), 1 - np.exp(-4)  # probability of noise within sigma, and within two
 
 
 @dataclass(frozen=True, eq=False)
 class Drift:
-    """Trend of the response over a record; shapes (lines,).
+    """How the response changes over a record; shapes (lines,).
 
     Attributes
     ----------
-    significant
-        Whether the machine drifts: all lines together, at `FALSE_ALARM`.
+    tested, significant
+        Whether there were enough windows without motion, and whether the machine changes: all lines together, at
+        `FALSE_ALARM`.
     lines
-        Lines whose own trend is significant.
+        Lines whose own change is significant.
     value
         Mean over the record.
+    components
+        What the change consists of, the clearest first.
+    begin_s, length_s
+        Begin and length of the record.
+    begin, end
+        Response at both ends of the record; the mean without a change, NaN where it is not known.
     change, sigma
-        Change of the response from the beginning to the end of the record and its standard deviation, unit of the
-        response; NaN at lines with fewer than six groups of windows.
-    spread
-        Part of the standard deviation of a mean over the record that the trend adds: the mean then covers the response
-        at a random moment of the record as often as noise; 0 unless `significant`. Of averages with forgetting it is
-        that of the periods that the newest one remembers.
+        Largest change of the response between two moments of the record and its standard deviation, unit of the
+        response; of a change that is not significant that of a straight line.
+    mean_sigma, begin_sigma, end_sigma
+        Standard deviations of the mean and of both ends by noise.
+    noise_share
+        Share of the noise in the variance of the windows about their mean.
+    rms
+        Standard deviation of the response over the record; 0 where no change is significant.
+    away
+        Response at moments of the record less its mean, (moments, lines); 0 where noise explains it.
     """
 
+    tested: bool
     significant: bool
     lines: Flags
     value: Complex
+    components: tuple[Component, ...]
+    begin_s: float
+    length_s: float
+    begin: Complex
+    end: Complex
     change: Complex
     sigma: Floats
-    spread: Floats
+    mean_sigma: Floats
+    begin_sigma: Floats
+    end_sigma: Floats
+    noise_share: Floats
+    rms: Floats
+    away: Complex
+
+    @classmethod
+    def unknown(cls, value: Complex) -> Drift:
+        """Nothing but the mean is known yet."""
+        n = len(value)
+        nothing, zeros = np.full(n, complex(np.nan, np.nan)), np.zeros(n)
+        return cls(
+            tested=False,
+            significant=False,
+            lines=np.zeros(n, dtype=np.bool_),
+            value=value,
+            components=(),
+            begin_s=0.0,
+            length_s=0.0,
+            begin=nothing.copy(),
+            end=nothing.copy(),
+            change=nothing,
+            sigma=np.full(n, np.nan),
+            mean_sigma=np.full(n, np.nan),
+            begin_sigma=np.full(n, np.nan),
+            end_sigma=np.full(n, np.nan),
+            noise_share=np.ones(n),
+            rms=zeros,
+            away=np.zeros((_MOMENTS, n), dtype=np.complex128),
+        )
+
+    def add(self, series: Series, remembered: float) -> None:
+        """Fit the components, or a straight line, at the lines of a series; of averages, as long as they remember."""
+        at = series.at
+        course = Course.of(series, self.components or [Component("trend", 1)])
+        first, last = _extent(series.share)
+        share = first + (last - first) * np.concatenate([[0.0, 1.0], _spread(_MOMENTS)])
+        functions, value = course.functions(share), course.value(share)
+        low, high = _farthest(value, share)
+        between = functions[high] - functions[low]
+        every = np.arange(len(at))
+        self.change[at] = value[high, every] - value[low, every]
+        self.sigma[at] = np.sqrt(course.noise * course.variance(between))
+        self.mean_sigma[at] = np.sqrt(course.noise / series.count.sum())
+        if not self.components:
+            self.begin[at] = self.end[at] = self.value[at]
+            self.begin_sigma[at] = self.end_sigma[at] = self.mean_sigma[at]
+            return
+        self.begin[at], self.end[at] = value[0], value[1]
+        self.begin_sigma[at], self.end_sigma[at] = np.sqrt(course.variance(functions[:2])[:, np.newaxis] * course.noise)
+        share = last - remembered * (last - share[2:])
+        functions, value = course.functions(share), course.value(share)
+        # The error of the fit is not a change of the machine.
+        power = np.mean(np.abs(value - value.mean(axis=0)) ** 2, axis=0)
+        by_noise = course.noise * float(np.mean(course.variance(functions - functions.mean(axis=0))))
+        real = np.maximum(power - by_noise, 0.0)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            certain = np.where(real > 0, np.sqrt(1 - (by_noise / power) ** 2), 0.0)
+        self.away[:, at] = (value - value.mean(axis=0)) * certain
+        self.rms[at] = np.sqrt(real)
+        self.noise_share[at] = np.minimum(course.noise / course.scatter, 1.0)
+
+    def variation(self, noise: Floats) -> Floats:
+        """What the change adds to the standard deviation `noise` of a mean, so that both cover together, (lines,).
+
+        The least sigma that covers the response at a random moment of the record as often as noise: 63 % of the
+        moments within sigma, and 98 % within two. It is at least `rms`, by up to a fifth where the change is even or
+        periodic, and more where it is short. 0 unless `significant`; NaN if it was not tested.
+        """
+        if not self.tested:
+            return np.full(len(self.value), np.nan)
+        added = np.zeros(len(self.value))
+        for i in np.flatnonzero(self.rms > 0):
+            own = noise[i] if np.isfinite(noise[i]) else 0.0
+            distance = np.sort(np.abs(self.away[:, i, np.newaxis] + own * _CIRCULAR).ravel())
+            one, two = (distance[min(int(p * distance.size), distance.size - 1)] for p in _WITHIN)
+            added[i] = np.sqrt(max(max(one, two / 2) ** 2 - own**2, self.rms[i] ** 2))
+        return added
+
+
+def _circular() -> Complex:
+    """Values of a circular complex normal variable of variance 1, evenly over its probability, (values,)."""
+    rings, angles = 16, 6
+    radius = np.sqrt(-np.log1p(-(np.arange(rings) + 0.5) / rings))
+    turn = np.arange(angles) / angles + _spread(rings)[:, np.newaxis]
+    return np.asarray((radius[:, np.newaxis] * np.exp(2j * np.pi * turn)).ravel())
+
+
+def _spread(count: int) -> Floats:
+    """Evenly spread numbers between 0 and 1, at no multiple of a period."""
+    return np.asarray((np.arange(count) + 0.5) * (np.sqrt(5) - 1) / 2 % 1)
+
+
+_CIRCULAR = _circular()
+
+
+def _extent(share: Floats) -> tuple[float, float]:
+    """The part of the record that these moments represent."""
+    half = (share[-1] - share[0]) / (len(share) - 1) / 2
+    return max(float(share[0] - half), 0.0), min(float(share[-1] + half), 1.0)
+
+
+def _farthest(value: Complex, share: Floats) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Numbers of the two moments between which each line changes most, the earlier first, (lines,); by two sweeps."""
+    every = np.arange(value.shape[1])
+    one = np.argmax(np.abs(value - value[0]), axis=0)
+    other = np.argmax(np.abs(value - value[one, every]), axis=0)
+    later = share[one] > share[other]
+    return np.where(later, other, one), np.where(later, one, other)
 
 
 class DriftTest(StatefulBase):
-    """Tests responses, in order, for a trend.
+    """Tests responses, in order, for a change of the machine.
 
-    Windows that do not overlap are averaged in up to 32 groups of equal length. At each line a parabola over time is
-    fitted to the groups, for the change as its straight part, and for the largest distance from the mean. Without
-    drift, the power of the straight part over that of the residuals is F(2, 2d), with d the number of groups less
-    three, so that its probability is (1 + F/d)^-d. A record is significant if one line has less than half of
-    `FALSE_ALARM` after Bonferroni, or all lines together have by Fisher's method.
+    Windows that do not overlap are averaged in groups of equal length, 64 to 512 of them. `components_of` chooses the
+    functions of time that noise does not explain, and each line has its own factors of them.
 
     Responses that average over periods are turned back into the windows that they gained. Of averages Gᵢ with the mean
     times tᵢ of their windows, a window that has its centre at c and the share s of the average's weight gives
@@ -71,11 +192,11 @@ class DriftTest(StatefulBase):
     Notes
     -----
     Where the schedule varies by more than a thousandth of its largest value, nothing is tested, because the response
-    may depend on it. A drift that returns to its beginning has no trend. Slow noise, longer than a group, can be taken
-    for drift.
+    may depend on it. A periodic change is seen from two groups a period on. Slow noise, longer than a group, can be
+    taken for a change.
     """
 
-    _stage = Stage("drift-test", 1)
+    _stage = Stage("drift-test", 2)
     _STATE = (
         "_windows",
         "_free",
@@ -93,8 +214,10 @@ class DriftTest(StatefulBase):
         self._window, self._rate_hz, n = lines.window, lines.rate_hz, len(lines)
         self._windows, self._free, self._level = 0, 0, 0
         self._schedule = np.full(2, np.nan)  # smallest and largest
-        self._times_s = np.zeros((1, _GROUPS_MAX, n))  # sums over the valid windows
-        self._pairs = np.zeros((3, _GROUPS_MAX, n), dtype=np.complex128)  # number, sums of numerator and denominator
+        most = int(np.clip(_VALUES_MAX // max(n, 1), *_GROUPS))
+        self._groups = 1 << most.bit_length() - 1
+        self._times_s = np.zeros((1, self._groups, n))  # sums over the valid windows
+        self._pairs = np.zeros((3, self._groups, n), dtype=np.complex128)  # number, sums of numerator and denominator
 
         self._begin = np.full(3, np.nan)  # first and newest sample, and time, of the first window
         self._average = np.full(2, np.nan)  # time and schedule of the newest average
@@ -159,7 +282,7 @@ class DriftTest(StatefulBase):
         pairs = np.where(used, np.stack([np.ones_like(value), value * weight, weight + 0j]), 0)
         done = 0
         while done < len(value):
-            if self._windows >> self._level == _GROUPS_MAX:
+            if self._windows >> self._level == self._groups:
                 self._merge()
             group = self._windows >> self._level
             stop = min(done + ((group + 1) << self._level) - self._windows, len(value))
@@ -171,53 +294,51 @@ class DriftTest(StatefulBase):
     def _merge(self) -> None:
         for sums in (self._times_s, self._pairs):
             half = sums[:, ::2] + sums[:, 1::2]
-            sums[:, : _GROUPS_MAX // 2] = half
-            sums[:, _GROUPS_MAX // 2 :] = 0
+            sums[:, : self._groups // 2] = half
+            sums[:, self._groups // 2 :] = 0
         self._level += 1
 
     def result(self) -> Drift:
         """The test on all responses up to now."""
         n = self._pairs.shape[2]
-        change, sigma = np.full(n, complex(np.nan, np.nan)), np.full(n, np.nan)
-        log_chance, farthest = np.zeros(n), np.zeros(n)
-        moved = np.ptp(self._schedule) > _MOVED * np.abs(self._schedule).max()
-        for i in range(0 if moved else n):
-            if (trend := self._trend(i)) is not None:
-                change[i], sigma[i], farthest[i], log_chance[i] = trend
-        own = log_chance < np.log(FALSE_ALARM / 2 / max(n, 1))
-        together = sum_exceeded(n, -float(log_chance.sum())) < FALSE_ALARM / 2
-        significant = bool(own.any() or together)
         with np.errstate(invalid="ignore", divide="ignore"):
             value = self._pairs[1].sum(axis=0) / self._pairs[2].sum(axis=0)
+        moved = np.ptp(self._schedule) > _MOVED * np.abs(self._schedule).max()
+        series, begin_s, length_s = self._series()
+        long_enough = [each for each in series if len(each.share) >= GROUPS_MIN]
+        if moved or not long_enough:
+            return Drift.unknown(value)
+        components, own = components_of(long_enough)
         remembered = min(1.0, 1 / self._share / max(self._windows, 1)) if self._share < 1 else 1.0
-        return Drift(significant, own, value, change, sigma, _WITHIN_SIGMA * farthest * remembered * significant)
+        found = Drift.unknown(value)
+        own = np.concatenate([own, np.zeros(n - len(own))])
+        lines = (own < np.log(FALSE_ALARM / 2 / n)) & bool(components)
+        found = replace(found, tested=True, significant=bool(components), lines=lines, components=tuple(components))
+        found = replace(found, begin_s=begin_s, length_s=length_s)
+        for each in long_enough:
+            found.add(each, remembered)
+        return found
 
-    def _trend(self, line: int) -> tuple[complex, float, float, float] | None:
-        """Change over the record, its sigma, the largest distance from the mean, and ln of the probability by chance.
-
-        None if there are too few groups.
-        """
-        count = self._pairs[0, :, line].real
-        some = count > 0
-        if np.count_nonzero(some) < _GROUPS_MIN:
-            return None
-        count = count[some]
-        time_s = self._times_s[0, some, line] / count
-        value = self._pairs[1, some, line] / self._pairs[2, some, line]
-        centred = time_s - time_s.mean()
-        q, r = np.linalg.qr(np.vander(centred, 3, increasing=True) * np.sqrt(count)[:, np.newaxis])
-        rotated = q.T @ (value * np.sqrt(count))
-        dof = len(count) - 3
-        residual = float(np.sum(np.abs(value * np.sqrt(count) - q @ rotated) ** 2)) / dof
-        residual += _ROUNDING**2 * float(np.mean(count * np.abs(value) ** 2))
-        if residual == 0:
-            return None
+    def _series(self) -> tuple[list[Series], float, float]:
+        """The lines by the groups in which they have windows; begin and length of the record."""
+        used = self._pairs[0].real > 0
+        if not used.any():
+            return [], 0.0, 0.0
+        patterns, of = np.unique(used, axis=1, return_inverse=True)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            time_s, value = self._times_s[0] / self._pairs[0].real, self._pairs[1] / self._pairs[2]
+        first_s, last_s, number = np.nanmin(time_s), np.nanmax(time_s), int(used.any(axis=1).sum())
         # The groups are centred on their windows; the record is one group longer.
-        longer = len(count) / (len(count) - 1)
-        size = float(np.ptp(time_s)) * longer / r[1, 1]
-        away = q[:, 1:] @ rotated[1:] / np.sqrt(count)
-        log_chance = -dof * float(np.log1p(abs(rotated[1]) ** 2 / residual / dof))
-        return complex(rotated[1] * size), abs(size) * residual**0.5, float(np.abs(away).max()) * longer, log_chance
+        half_s = float(last_s - first_s) / max(number - 1, 1) / 2
+        begin_s, length_s = float(first_s) - half_s, float(last_s - first_s) + 2 * half_s
+        series = []
+        for number, pattern in enumerate(patterns.T):
+            at = np.flatnonzero(of.ravel() == number)
+            rows = np.flatnonzero(pattern)
+            if rows.size and length_s > 0:
+                share = (time_s[rows, at[0]] - begin_s) / length_s
+                series.append(Series(at, share, self._pairs[0][rows, at[0]].real, value[np.ix_(rows, at)]))
+        return series, begin_s, length_s
 
     @property
     def _identity(self) -> str:

@@ -80,14 +80,15 @@ def mean_response(responses: Responses | Iterable[Responses]) -> Responses:
     mean, unless it was valid for longer than invalid for that reason, as in motion, where errors that repeat are not
     known. The three windows before the first verdict are ignored.
 
-    A machine that drifts is averaged. If its drift is significant (`DriftTest`), sigma contains it without reduction,
-    so that it covers the response at a random moment of the record.
+    A machine that changes is averaged. If its change is significant (`DriftTest`), sigma² = noise² + distortion² +
+    variation²: `variation` is not reduced by averaging, so that sigma covers the response at a random moment of the
+    record, and the noise is the scatter about the course of the response.
 
     Responses that average over periods already contain each other: of these the newest valid one is returned, with the
     drift in its sigma.
 
-    Bias: a change that returns to its beginning is averaged, and only its scatter is in sigma. With a Hann window the
-    errors correlate less, and sigma is too high.
+    Bias: of a periodic change with fewer than two groups of windows a period only the scatter is in sigma. With a Hann
+    window the errors correlate less, and sigma is too high.
 
     Parameters
     ----------
@@ -198,8 +199,7 @@ class RunningMean:
         """
         response = self._average()[0]
         if self.averages:
-            of_noise = np.sqrt(np.maximum(response.sigma**2 - np.nan_to_num(response.distortion, posinf=0.0) ** 2, 0.0))
-            return replace(response, sigma=of_noise), response.weight
+            return replace(response, sigma=response.noise), response.weight
         scatter, windows, free = self._scatter(response.valid)
         several = windows >= 2
         dof = float(np.min(free, where=several, initial=np.inf))
@@ -222,7 +222,10 @@ class RunningMean:
         several = windows >= 2
         single = np.where(np.isfinite(self._least), self._least, np.nan)
         added = np.where(np.isfinite(distortion) & valid, distortion, 0.0)
-        together = np.hypot(np.hypot(scatter, added), self.drift.result().spread)
+        drift = self.drift.result()
+        scatter = scatter * np.sqrt(drift.noise_share)
+        variation = drift.variation(np.hypot(scatter, added))
+        together = np.sqrt(scatter**2 + added**2 + np.nan_to_num(variation) ** 2)
         dof = free[several].min() if several.any() else self._dof or np.nan
         if several.any() and added.any():
             with np.errstate(invalid="ignore", divide="ignore"):
@@ -244,12 +247,23 @@ class RunningMean:
             estimator=newest.estimator,
             input_coherence=self._input_coherence.value[np.newaxis],
             distortion=np.where(valid & np.isfinite(distortion), distortion, np.nan)[np.newaxis],
+            variation=np.where(valid & several, variation, np.nan)[np.newaxis],
         )
 
 
 def with_drift(average: Responses, drift: Drift) -> Responses:
-    """An average over periods whose sigma contains the drift of the machine meanwhile."""
-    return replace(average, sigma=np.hypot(average.sigma, drift.spread))
+    """An average over periods whose sigma contains the change of the machine meanwhile, as the test found it.
+
+    The scatter of its periods contains the change. A variation that the average has already is replaced, if there was
+    a test: this has seen the whole record.
+    """
+    if not drift.tested:
+        return average
+    apart = np.nan_to_num(average.variation) > 0
+    noise = average.noise * np.where(apart, 1.0, np.sqrt(drift.noise_share))
+    repeated = np.hypot(noise, np.where(np.isfinite(average.distortion), average.distortion, 0.0))
+    variation = np.where(average.valid, drift.variation(repeated[0]), np.nan)
+    return replace(average, sigma=np.where(average.valid, np.hypot(repeated, variation), np.nan), variation=variation)
 
 
 def _without(response: Responses, lines: NDArray[np.bool_]) -> Responses:

@@ -65,6 +65,7 @@ class _Each:
     variance: Floats
     dof: Floats
     repeated: Floats
+    varied: Floats
 
     @property
     def used(self) -> Flags:
@@ -142,7 +143,7 @@ class RecordingsMean:
             value = np.nansum(weights * each.value, axis=0) / np.nansum(weights, axis=0)
             between = self._between(each, weights, value, chance)
             sigma, dof = _sigma(each, weights, between, excess)
-            repeated = _mean_of(np.abs(weights), each.repeated)
+            repeated, varied = (_mean_of(np.abs(weights), part) for part in (each.repeated, each.varied))
         valid = each.count >= _RECORDINGS_MIN
         newest = ones[-1]
         response = replace(
@@ -158,11 +159,12 @@ class RecordingsMean:
             input_coherence=_over(ones, "input_coherence"),
             weight=np.full(len(valid), complex(np.nan, np.nan)),
             distortion=self._distortion(ones, valid),
+            variation=np.where(valid, np.sqrt(varied), np.nan),
         )
         return Responses.of(response), between
 
     def _each(self) -> tuple[list[Response], _Each]:
-        responses, weights, repeated = [], [], []
+        responses, weights, repeated, varied = [], [], [], []
         for mean in self._means:
             try:
                 response, weight = mean.without_distortion()
@@ -170,9 +172,10 @@ class RecordingsMean:
                 continue
             responses.append(response)
             weights.append(np.where(np.isfinite(weight), weight, 1.0))
-            spread = mean.drift.result().spread
+            spread = np.nan_to_num(mean.drift.result().variation(response.sigma))
             distortion = np.where(np.isfinite(response.distortion) & (not self.realisations), response.distortion, 0.0)
             repeated.append(spread**2 + distortion**2)
+            varied.append(spread**2)
         valid = np.array([response.valid for response in responses])
         if not responses or np.all(valid.sum(axis=0) < _RECORDINGS_MIN):
             raise SignalError(
@@ -184,7 +187,9 @@ class RecordingsMean:
         sigma = np.where(valid, np.array([response.sigma for response in responses]), np.nan)
         rounding = (_ROUNDING * np.abs(value)) ** 2
         dof = np.array([response.dof for response in responses])[:, np.newaxis]
-        return responses, _Each(value, np.array(weights), sigma**2 + rounding, dof, np.array(repeated))
+        return responses, _Each(
+            value, np.array(weights), sigma**2 + rounding, dof, np.array(repeated), np.array(varied)
+        )
 
     def _between(self, each: _Each, weights: Complex, value: Complex, chance: float) -> RecordingScatter:
         size, count = np.abs(weights), each.count

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from livebode import fitting, preparation
 from livebode.analysis import LIVE_VALUES_MAX, Overview
 from livebode.configuration import Axis
-from livebode.core import INTERVAL_FACTOR, Block, Channel, Event, Lines, LivebodeError, Response, Responses, Stateful
+from livebode.core import Block, Channel, Event, LivebodeError, Response, Responses, Stateful
 from livebode.dataclass import dataclass
 from livebode.estimation import Follower, Settings, plant_kinds
 from livebode.language import Message
@@ -23,6 +23,7 @@ from livebode.records import RESPONSE_TABLES
 from livebode.runtime import summary
 from livebode.runtime.change_detection import ChangeDetection, change_detection
 from livebode.runtime.documents import Document, FitResults
+from livebode.runtime.drift import drift_events, of_drift
 from livebode.runtime.estimate import (
     SEEN_AGAIN_BYTES,
     Estimate,
@@ -33,7 +34,7 @@ from livebode.runtime.estimate import (
 
 if TYPE_CHECKING:
     from livebode.core import Parameters
-    from livebode.fitting import Drift, DriftTest, Fit, RecordingsMean
+    from livebode.fitting import DriftTest, Fit, RecordingsMean
     from livebode.runtime.fits import Fits
     from livebode.runtime.joining import WaitingSpectra
     from livebode.runtime.live_checks import LiveChecks
@@ -42,41 +43,6 @@ if TYPE_CHECKING:
 
 ROWS_MAX = 8
 """The spectra of a Block with more are not joined with those of other axes: they are together already."""
-
-
-def of_drift(drift: Drift, lines: Lines) -> dict[str, Any]:
-    """Entries on a drift of the machine within the recording: at the lines where it is significant, or the clearest."""
-    if not drift.significant:
-        return {"found": False, "lines": []}
-    shown = drift.lines.copy()
-    if not shown.any():
-        shown[np.nanargmax(np.abs(drift.change) / drift.sigma)] = True
-    size = np.abs(drift.value)
-    rows = [
-        {
-            "frequency_hz": float(lines.frequency_hz[i]),
-            "percent": 100 * float(abs(drift.change[i]) / size[i]),
-            "percent_sigma": 100 * float(drift.sigma[i] / size[i]),
-        }
-        for i in np.flatnonzero(shown)
-    ]
-    return {"found": True, "lines": rows}
-
-
-def drift_events(drift: Mapping[str, Any], sample: int, time_s: float) -> list[Event]:
-    """None, or one event, at the end of the recording; `drift` as in run.json."""
-    if not drift["found"]:
-        return []
-    most = max(drift["lines"], key=lambda line: line["percent"])
-    message = Message(
-        "the response drifts during the recording, most at {line_hz:g} Hz: by {percent:.2g} % ± "
-        "{bound_percent:.2g} % from the beginning to the end; the bound of a mean contains the drift; for the machine "
-        "at one time, run a part of the recording (--from, --to)",
-        line_hz=most["frequency_hz"],
-        percent=most["percent"],
-        bound_percent=INTERVAL_FACTOR * most["percent_sigma"],
-    )
-    return [Event("drift", sample, time_s, message, {"lines": drift["lines"]})]
 
 
 def of_recordings(mean: RecordingsMean) -> dict[str, Any]:
