@@ -79,8 +79,8 @@ static job job_of(size_t count)
     job j;
     j.state.largest = j.state.step = 0.0;
     const lb_line_moments m = {
-        1,   BINS, (int64_t *)claim(1, sizeof(int64_t)), reals(LB_LINE_MEANS * BINS), reals(LB_LINE_SCATTER * BINS),
-        NULL};
+        1,    BINS, (int64_t *)claim(1, sizeof(int64_t)), reals(LB_LINE_MEANS * BINS), reals(LB_LINE_SCATTER * BINS),
+        NULL, NULL};
     j.state.moments = m;
     j.state.output = reals(2 * MAINS_BINS);
     j.state.silent_power = reals(LB_SILENT_PERIODS * LINES);

@@ -11,45 +11,44 @@ from livebode.core import Event, Lines
 from livebode.estimation import PeriodicVariation
 
 LINES = Lines.parse("20:140:10", 4000, 400)
-WINDOW_S, HALF = 0.1, 200
+WINDOW_S, WINDOW = 0.1, 400
 NOISE = 0.02  # of the response, in a window
 Rows = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
 
 def windows(seed: int, count: int, change: np.ndarray | float = 0.0) -> Rows:
-    """Windows that overlap by half, with noise that they have in common; the change of the response at each line."""
-    rng = np.random.default_rng(seed)
-    halves = rng.standard_normal((2, count + 1, len(LINES))) * NOISE
-    noise = (halves[:, 1:] + halves[:, :-1]) / 2
+    """Windows one after the other, with noise; the change of the response at each line."""
+    noise = np.random.default_rng(seed).standard_normal((2, count, len(LINES))) * NOISE / np.sqrt(2)
     input_ = np.full((count, len(LINES)), 2 + 1j)
-    time_s = np.arange(count) * WINDOW_S / 2
+    time_s = np.arange(count) * WINDOW_S
     value = 1j * (1 + noise[0] + 1j * noise[1] + change)
-    return np.stack([value * input_, input_]), time_s, np.full(count, np.nan), np.arange(count) * HALF + 399
+    return np.stack([value * input_, input_]), time_s, np.full(count, np.nan), np.arange(count) * WINDOW + 399
 
 
 def varying(seed: int, count: int, frequency_hz: float, amplitude: float) -> np.ndarray:
     """Of each line between a fifth and the whole of an amplitude, averaged over a window."""
     size = amplitude * np.random.default_rng(seed).uniform(0.2, 1, len(LINES)) * np.sinc(frequency_hz * WINDOW_S)
-    return np.outer(np.cos(2 * np.pi * frequency_hz * np.arange(count) * WINDOW_S / 2), size)
+    return np.outer(np.cos(2 * np.pi * frequency_hz * np.arange(count) * WINDOW_S), size)
 
 
 def events_of(rows: Rows) -> list[Event]:
     events: list[Event] = []
-    PeriodicVariation(LINES, HALF, events).process(*rows)
+    PeriodicVariation(LINES, WINDOW, events).process(*rows)
     return events
 
 
-@pytest.mark.parametrize("frequency_hz", [0.9, 1.3, 3.7, 7.3])
+@pytest.mark.parametrize("frequency_hz", [0.5, 1.3, 3.7])
 def test_a_periodic_variation_is_named_with_its_frequency(frequency_hz: float) -> None:
+    """Noise is 13 % of the amplitude, which is the largest of 13 lines."""
     for seed in range(5):
         facts = events_of(windows(seed, 600, varying(seed, 600, frequency_hz, 0.04)))[0].details
         assert facts["variation_hz"] == pytest.approx(frequency_hz, abs=facts["resolution_hz"])
-        assert facts["percent"] == pytest.approx(4, rel=0.3)
+        assert facts["percent"] == pytest.approx(4, rel=0.5)
 
 
 def test_noise_is_not_reported() -> None:
     """20 runs of ten minutes; at 0.5 %, more than one has a probability of 0.5 %."""
-    assert sum(bool(events_of(windows(seed, 12000))) for seed in range(20)) <= 1
+    assert sum(bool(events_of(windows(seed, 6000))) for seed in range(20)) <= 1
 
 
 @pytest.mark.parametrize("what", ["hum", "drift", "step"])
@@ -67,9 +66,9 @@ def test_any_division_of_the_windows_and_a_restored_search_report_the_same() -> 
     assert len(expected) == 1
     for edges in ([0, 3, 9, 135, 136, 137, 300, 600], list(range(601))):
         events: list[Event] = []
-        search = PeriodicVariation(LINES, HALF, events)
+        search = PeriodicVariation(LINES, WINDOW, events)
         for first, last in pairwise(edges):
-            snapshot, search = search.snapshot(), PeriodicVariation(LINES, HALF, events)
+            snapshot, search = search.snapshot(), PeriodicVariation(LINES, WINDOW, events)
             search.restore(snapshot)
             now = slice(first, last)
             search.process(rows[0][:, now], *(part[now] for part in rows[1:]))

@@ -408,7 +408,7 @@ LB_INLINE void process_lines(const job *j, row_facts *f, size_t first, size_t co
     const lb_window now = read_window(j, f, first, count);
     lb_some_moments m = lb_load_moments(j->m, at, count);
     some_changes c = load_changes(j->m, at, count);
-    lb_deviation apart;
+    lb_deviation apart = {{lb_all(0.0), lb_all(0.0), lb_all(0.0), lb_all(0.0)}};
     if (f->usable && j->s->averages) {
         apart = lb_add_window(&m, j->weights->forgetting, f->of->share, &now);
     }

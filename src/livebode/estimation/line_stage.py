@@ -82,11 +82,7 @@ class LineStage(StatefulBase):
         self._change = self._variation = None
         if settings.average:
             self._change = LastingChange(lines, self._events)
-            # Two windows in a period, where they are equally far from each other: a period of the change is shown
-            # up to twice the frequency.
-            self._parts = 2 if lines.window % settings.step == 0 and self._places % 2 == 0 else 1
-            distance = max(lines.window, settings.step) // self._parts
-            self._variation = PeriodicVariation(lines, distance, self._events)
+            self._variation = PeriodicVariation(lines, max(lines.window, settings.step), self._events)
         self._moving = 0
         self._largest = 0.0
 
@@ -310,9 +306,8 @@ class LineStage(StatefulBase):
         centre: Floats,
         sample: NDArray[np.int64],
     ) -> None:
-        """Test the windows at one place of a period, which do not overlap, and at two."""
-        distance = self._places // self._parts
-        chosen = np.arange(-series % distance, len(usable), distance)
+        """Test the windows at the first place of a period, which do not overlap."""
+        chosen = np.arange(-series % self._places, len(usable), self._places)
         chosen = chosen[usable[chosen]]
         if not chosen.size:
             return
@@ -321,11 +316,8 @@ class LineStage(StatefulBase):
             signals[role][chosen, :lines] for role in ("output", method.denominator, method.reference)
         )
         pair = np.stack([times(output, reference.conj()), times(denominator, reference.conj())])
-        variation.process(pair, centre[0, chosen], centre[1, chosen], sample[chosen])
-        first = (series + chosen) % self._places == 0
-        if first.any():
-            chosen = chosen[first]
-            change.process(pair[:, first], centre[0, chosen], centre[1, chosen], sample[chosen])
+        for test in (change, variation):
+            test.process(pair, centre[0, chosen], centre[1, chosen], sample[chosen])
 
     def _detected(self, signals: dict[Role, Complex]) -> Floats | None:
         """Noise of one window by the detection lines, as a power of numerator·conj(reference); None without them."""

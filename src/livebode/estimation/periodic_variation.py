@@ -17,7 +17,7 @@ _LOWEST = 4  # bin: below, a drift is not told from a period
 _BESIDE = 3  # bins to the next ones that a period does not reach through the Hann window
 _PROMINENT = 3.0  # times the evidence beside a period, which a step or a drift does not reach
 _LIMIT = 12.0  # of the evidence of one line: a period is in several
-_TESTS = 200  # of a run of ten minutes and windows of 0.1 s, two in each period
+_TESTS = 100  # of a run of ten minutes and windows of 0.1 s
 _NAMED_MAX = 8
 
 
@@ -27,15 +27,15 @@ class PeriodicVariation(StatefulBase):
     A response that varies as 1 + a·cos(2πft) has errors at f and at −f; a disturbance that is added to the signals,
     such as hum, has them at one. So the evidence of a line is the smaller power of both over the noise, the median of
     all frequencies. The sum over the lines, of which none counts more than twelve, is at most a Gamma variable for
-    noise. `FALSE_ALARM` is divided by the numbers of tests and frequencies (Bonferroni). What a window averages is not
-    seen: frequencies from 1/N on, or with one window in a period from half of that on, appear at another one.
+    noise. `FALSE_ALARM` is divided by the numbers of tests and frequencies (Bonferroni). Frequencies above half
+    of the windows' rate appear as far from a multiple of it.
 
     Parameters
     ----------
     lines
         Lines of the responses.
     distance
-        Samples from one window to the next: N or N/2. Others begin again.
+        Samples from one window to the next. After others the search begins again.
     events
         Where an event is added, once for a frequency.
     """
@@ -92,10 +92,7 @@ class PeriodicVariation(StatefulBase):
         errors -= slope * (slope * errors).sum(axis=0) / np.sum(slope**2)
         both = np.fft.fft(errors * taper[:, np.newaxis], axis=0)
         bins = np.arange(_LOWEST, _HALF - _BESIDE)
-        # Windows that overlap by half average what they have in common, up to nothing at half of their rate.
-        overlaps = self._distance < self._lines.window
-        shape = 1 + overlaps * np.cos(2 * np.pi * np.arange(_WINDOWS) / _WINDOWS)
-        power = (both.real**2 + both.imag**2) / np.maximum(shape, 0.02)[:, np.newaxis]
+        power = both.real**2 + both.imag**2
         with np.errstate(all="ignore"):
             power = power * np.log(2) / np.median(power, axis=0)
         least = np.where(np.isfinite(power), np.minimum(power, power[-number]), 0.0)
@@ -109,7 +106,8 @@ class PeriodicVariation(StatefulBase):
             self._report(sample, time_s, int(k), np.abs(both[k]) + np.abs(both[-k]), float(taper.sum()))
 
     def _report(self, sample: int, time_s: float, k: int, sizes: Floats, scale: float) -> None:
-        resolution_hz = self._lines.rate_hz / self._distance / _WINDOWS
+        rate_hz = self._lines.rate_hz / self._distance
+        resolution_hz = rate_hz / _WINDOWS
         frequency_hz = k * resolution_hz
         known = np.isfinite(self._named_hz)
         if known.all() or np.any(np.abs(self._named_hz[known] - frequency_hz) < 2 * resolution_hz):
@@ -120,10 +118,12 @@ class PeriodicVariation(StatefulBase):
             share = np.nan_to_num(share / np.abs(self._reference[0] / self._reference[1]), posinf=0.0)
         line = int(np.argmax(share))
         message = Message(
-            "the response varies periodically with {variation_hz:.3g} ± {resolution_hz:.2g} Hz, most at {line_hz:g} "
-            "Hz: by ± {percent:.2g} %, as with a load that turns, or cogging",
+            "the response varies periodically with {variation_hz:.3g} ± {resolution_hz:.2g} Hz (or that beside a "
+            "multiple of {rate_hz:.4g} Hz), most at {line_hz:g} Hz: by ± {percent:.2g} %, as with a load that turns, "
+            "or cogging",
             variation_hz=frequency_hz,
             resolution_hz=resolution_hz,
+            rate_hz=rate_hz,
             line_hz=float(self._lines.frequency_hz[line]),
             percent=100 * float(share[line]),
         )
