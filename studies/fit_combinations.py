@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag, expm
 
-from livebode.analysis import OpenLoop, margins, stable
+from livebode.analysis import margins_of, stable
 from livebode.core import PID, Lines, Loop, Responses
 from livebode.fitting import Fit, Fitter, TwoMass, fit
 from livebode.fitting.extended import LAG, MODE, ExtendedModel
@@ -229,8 +229,7 @@ def outcome(effects: tuple[str, ...], seed: int) -> Outcome | None:
 
 def _margins_covered(of: Machine, found: Fit) -> Floats:
     truth = true_margins(of)
-    found = found.with_unseen()
-    read = margins(found.parameters, OpenLoop(found.model, of.loop, found.rate_hz, found.hold), found.band_hz)
+    read = margins_of(found, of.loop)
     if truth is None or not read.ok[0]:
         return np.full(len(MARGINS), np.nan)
     column = [read.index(name) for name in MARGINS]

@@ -10,9 +10,9 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from livebode.analysis import Margins, OpenLoop, against_lines, margins
+from livebode.analysis import Margins, OpenLoop, against_lines, margins, margins_of
 from livebode.core import PID, FitError, LivebodeError, Loop, Responses, UsageError
-from livebode.fitting import EvaluationGrid, Fitter, Rigid
+from livebode.fitting import EvaluationGrid, Fitter, Rigid, fit
 from tests.support.belt_loops import BAND_HZ, LINES, read, responses_of
 from tests.support.errors import refused
 from tools.loops import BELT, MODEL, Case, parameters, values
@@ -167,3 +167,26 @@ def test_lines_do_not_contradict_true_margins() -> None:
         case, _, measured = delayed(gain, 0.0)
         found = against_lines(margins(Fitter(MODEL).process(measured), case.open, BAND_HZ), measured, case.loop)
         assert found.ok.all()
+
+
+def test_bounds_of_margins_contain_the_models_that_the_lines_do_not_tell_apart() -> None:
+    """Of a fit with competitors the variance is that of the mixture: own variances, and distances, by the weights."""
+    f = LINES.frequency_hz
+    value = MODEL.at([0.0028, 6.7, 5e5, 130.0, 0, 0, 3e-4], EvaluationGrid.of(LINES))
+    rng, one = np.random.default_rng(4), np.zeros(1, dtype=int)
+    sigma, ones = 0.005 * np.abs(value)[np.newaxis], np.ones((1, f.size))
+    noise = sigma * (rng.standard_normal(f.size) + 1j * rng.standard_normal(f.size)) / np.sqrt(2)
+    found = fit(
+        Responses(LINES, value + noise, sigma, one + np.inf, ones, ones > 0, one, one, one + 0.0, one + 0.0), MODEL
+    )
+    loop = Loop(feedback=PID(gain=0.2308, integral_time_s=0.2, rate_hz=4000, delay_ticks=2))
+    assert found.competitors is not None
+    model, rows, weight = found.competitors
+    each = margins(rows, OpenLoop(model, loop, 4000.0), found.band_hz)
+    of = margins_of(found, loop)
+    for name in ("gain_margin", "phase_margin", "bandwidth"):
+        i = of.index(name)
+        own, apart = each.sigma[:, i], each.value[:, i] - of.value[0, i]
+        assert each.ok.all()
+        assert of.sigma[0, i] == pytest.approx(np.sqrt(np.average(own**2 + apart**2, weights=weight)), rel=1e-9)
+        assert of.bound()[0, i] >= 1.9 * own[0] * np.sqrt(weight[0])

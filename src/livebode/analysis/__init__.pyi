@@ -15,6 +15,7 @@ from livebode.analysis._margins import against_lines as against_lines
 from livebode.analysis._margins import peak_sensitivity_at_lines as peak_sensitivity_at_lines
 from livebode.analysis._margins import worst as worst
 from livebode.analysis.equivalent import equivalent_plant as equivalent_plant
+from livebode.analysis.fit_margins import margins_of as margins_of
 from livebode.analysis.fits import by_place as by_place
 from livebode.analysis.fits import fit_averaged as fit_averaged
 from livebode.analysis.fits import fit_poles as fit_poles

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from livebode.analysis._margins import CONTRADICTED, Margins, against_lines, peak_sensitivity_at_lines, worst
+from livebode.analysis.fit_margins import among_competitors
 from livebode.analysis.fits import by_place
 from livebode.analysis.margin_reading import margins
 from livebode.analysis.open_loop import OpenLoop
@@ -144,7 +145,7 @@ def loop_report(fit: Fit, words: str, responses: Responses, loop: Loop) -> LoopR
             "set fit.output, or fit another model",
             models=[fit.model.name],
         )
-    fit = fit.with_unseen()
+    every_model, fit = fit, fit.with_unseen()
     around = OpenLoop(fit.model, loop, fit.rate_hz, fit.hold)
     fits, mean = fit.parameters, mean_response(responses)
     fitted_to = fit.measured if fit.measured is not None else mean
@@ -155,7 +156,8 @@ def loop_report(fit: Fit, words: str, responses: Responses, loop: Loop) -> LoopR
         # The fit may belong to one time, and is not better than the worst of them.
         if over.ok.sum() > len(places) // 2:
             fits, measured = Parameters.join([over, fits]), Responses.join([places, fitted_to])
-    every = against_lines(margins(fits, around, fit.band_hz), measured, loop)
+    read = among_competitors(margins(fits, around, fit.band_hz), every_model, loop)
+    every = against_lines(read, measured, loop)
     return LoopReport(
         fit=fit,
         of=words,

@@ -56,8 +56,7 @@ def named_average(of: Competition) -> Average:
     family, own = of.family, of.every[0].of.member.effects
     frictions = set(family.base.frictions)
     alike = [c for c in of.every if c.of.member.effects - frictions == own - frictions]
-    others = {e for e in family.effects if e not in family.extras and of.share(e) > 0}
-    return _about(of, alike, own | others, of.every[0].of.free)
+    return _about(of, alike, own | {e for e in frictions if of.share(e) > 0}, of.every[0].of.free)
 
 
 def specified(of: Competition) -> Average:
@@ -81,7 +80,7 @@ def _about(of: Competition, centre: Sequence[Competitor], effects: Collection[st
         for name in ("mode", "mode_damping"):
             apart[:, family.index(name)] *= there
     matrix = np.einsum("m,mij->ij", of.weight, matrices) + np.einsum("m,mi,mj->ij", of.weight, apart, apart)
-    moved = family.free(Member(frozenset(effects), True))
+    moved = family.free(Member(frozenset(effects), damped=True))
     for name, value in family.specified.items():
         if not moved[family.index(name)]:
             mean[family.index(name)] = value

@@ -20,8 +20,10 @@ WINDOW = 7.0
 """Difference of cost up to which a model takes part in the search and in the average: a weight of 3 % of the best."""
 
 _LEVELS, _PARENTS = 6, 6
-_FRICTION_PRICE = 2.5  # required decrease of −2·ln(likelihood): 1.6 sigma, because every machine has some
+# Required decreases of −2·ln(likelihood). A machine with friction has it at motor and load: they have one price.
+_FRICTION_PRICE = 6.0
 _PRICE = {DELAY: 4.0, LAG: 5.0, RESIDUAL: 5.0, MODE: 2.0}
+_HELD_PRICE = 6.0  # of a mode above the lines whose frequency is held
 _DAMPING_PRICE = 4.0  # of a mode whose damping is free
 _APART = 0.15  # of a frequency of the model itself: a nearer further mode would change the model's own mode
 _MODES, _MODES_TRIED = 40, 2
@@ -104,8 +106,11 @@ def compete(
 
 def price(member: Member, lines: int) -> float:
     """Decrease of −2·ln(likelihood) that the effects of a model must bring."""
-    total = sum(_PRICE.get(name, _FRICTION_PRICE) for name in member.effects)
-    if MODE in member.effects:
+    frictions = len(member.effects) - sum(name in _PRICE for name in member.effects)
+    total = sum(_PRICE.get(name, 0.0) for name in member.effects) + _FRICTION_PRICE * (frictions > 0)
+    if MODE in member.effects and member.held_at:
+        total += _HELD_PRICE - _PRICE[MODE]
+    elif MODE in member.effects:
         # The search is over all lines, so the largest of as many random values is found.
         total += 2 * float(np.log(lines)) + _DAMPING_PRICE * member.damped
     return total
@@ -116,17 +121,20 @@ Start = tuple[Member, Floats, float]
 
 def _neighbours(family: Family, of: FittedMember, measured: MeasuredRows) -> Iterator[Start]:
     """Each model that differs by one effect, with its start values and its start of ε."""
-    effects, damped = of.member
+    effects, damped, held_at = of.member
     for name in family.effects:
         if name in effects:
-            less = Member(effects - {name}, damped and name != MODE)
+            less = Member(effects - {name}) if name == MODE else of.member._replace(effects=effects - {name})
             yield less, _without(family, of, less, name), of.epsilon
         elif name == MODE and RESIDUAL not in effects:
             more = Member(effects | {MODE})
             yield from ((more, family.without(start, more), of.epsilon) for start in _mode_starts(family, of, measured))
         elif name != MODE and not (name == RESIDUAL and MODE in effects):
-            yield Member(effects | {name}, damped), _with(family, of, name), of.epsilon
-    if MODE in effects:
+            yield of.member._replace(effects=effects | {name}), _with(family, of, name), of.epsilon
+    for place in family.held_at if RESIDUAL in effects else ():
+        other = Member(effects - {RESIDUAL} | {MODE}, held_at=place)
+        yield other, family.without(of.values, other), of.epsilon
+    if MODE in effects and not held_at:
         other = of.member._replace(damped=not damped)
         yield other, family.without(of.values, other), of.epsilon
 

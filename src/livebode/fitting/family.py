@@ -19,9 +19,10 @@ from livebode.fitting.weights import misfit, own_epsilon
 NEAR_NYQUIST = 0.9
 """Of half the rate: a mode that is closer and its alias look alike."""
 
-_NO_LAG_S = 1e-12  # a lag whose pole no rate can show
+_NO_LAG_S = 1e-14  # a lag whose pole no rate can show
 _NO_FRICTION = 1e-7  # of the smallest that the lines show
 _ROUNDS, _REWEIGHTED, _SAME = (4, 4, 12), 3, 0.03
+_HELD_AT = (1.2, 1.5, 2.0)  # of the highest line: modes of which the lines show the compliance, and not the frequency
 _PARTS = {LAG: ("lag",), RESIDUAL: ("residual_compliance",), MODE: ("mode", "mode_damping", "mode_gain")}
 _NOT_THERE = {"lag": _NO_LAG_S, "residual_compliance": 0.0, "mode_gain": 0.0, "mode_damping": START_DAMPING}
 
@@ -32,10 +33,12 @@ def _row(of: Solution, i: int) -> Solution:
 
 
 class Member(NamedTuple):
-    """A model of the family: its effects, and whether the damping of its further mode is free."""
+    """A model of the family: its effects, whether the damping of its further mode is free, and the frequency at which
+    that mode is held, over the highest line; zero where it is fitted."""
 
     effects: frozenset[str]
     damped: bool = False
+    held_at: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,6 +94,9 @@ class Family:
         self.model: PhysicalModel = model
         self.problem = problem.variant(model, free=own)
         self.effects = (*own, *extras)
+        self.held_at = tuple(
+            x for x in _HELD_AT if MODE in extras and x * top_hz < NEAR_NYQUIST * problem.grid.rate_hz / 2
+        )
         self.specified = problem.held
         self.names = model.names
         self._always = np.array([name in base.names and name not in problem.held for name in self.names])
@@ -106,7 +112,10 @@ class Family:
         free = self._always.copy()
         for effect in member.effects:
             for name in _PARTS.get(effect, (effect,)):
-                free[self.index(name)] = name != "mode_damping" or member.damped
+                free[self.index(name)] = True
+        for name, fitted in (("mode_damping", member.damped), ("mode", not member.held_at)):
+            if MODE in member.effects:
+                free[self.index(name)] = fitted
         return free
 
     def without(self, values: Floats, member: Member) -> Floats:
@@ -118,6 +127,8 @@ class Family:
                     values[..., self.index(name)] = self._rest[name]
         if not member.damped and MODE in self.effects:
             values[..., self.index("mode_damping")] = START_DAMPING
+        if member.held_at:
+            values[..., self.index("mode")] = member.held_at * self.top_hz
         return values
 
     def padded(self, values: Floats) -> Floats:

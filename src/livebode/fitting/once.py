@@ -28,6 +28,7 @@ from livebode.language import Message
 EPSILON_LARGE = 0.1
 """Model error as a share of |G| from which bounds are not called 95 % bounds, whatever its pattern."""
 
+_NOTABLE = 0.03  # of the weight of the best model: others count too little to be read
 _ROUNDING = 1e-9  # of a value: rounding gives a quantity of fixed values a bound of this size
 
 
@@ -56,6 +57,9 @@ class Fit:
         compliance". Values, bounds, response and margins include them.
     correlation
         Correlation of the residuals of neighbouring lines, if they follow a pattern that no model explains; else None.
+    competitors
+        Model that all have in common, parameters (a row for each), and weights of the models that the lines do not tell
+        apart; None where there is only the fitted one.
     averaged
         Model and parameters of the average over all models that the lines do not tell apart; see `with_unseen`.
     refusal
@@ -81,6 +85,7 @@ class Fit:
     asked: PhysicalModel | None = None
     taken: tuple[str, ...] = ()
     correlation: float | None = None
+    competitors: tuple[PhysicalModel, Parameters, NDArray[np.float64]] | None = None
     averaged: tuple[PhysicalModel, Parameters] | None = None
     refusal: str = ""
 
@@ -326,6 +331,7 @@ def _chosen(plain: Fit, of: Competition, rows: MeasuredRows, noise_dof: NDArray[
         plain, model=model, parameters=parameters, derived=derived, held=held, correlation=pattern,
         taken=tuple(sorted(taken, key=lambda effect: -of.share(effect))),
         averaged=None if averaged is None else (averaged.model, _parameters(plain, averaged, fitted)),
+        competitors=None if averaged is None else _rows_of(of, plain, fitted),
     )  # fmt: skip
 
 
@@ -335,6 +341,20 @@ def _parameters(plain: Fit, mean: Average, fitted: FittedRows) -> Parameters:
         plain.parameters, model=model.name, names=model.names, units=model.units, value=mean.values[np.newaxis],
         covariance=mean.covariance[np.newaxis], epsilon=fitted.epsilon, chi2=fitted.chi2, dof=fitted.dof,
     )  # fmt: skip
+
+
+def _rows_of(
+    of: Competition, plain: Fit, fitted: FittedRows
+) -> tuple[PhysicalModel, Parameters, NDArray[np.float64]] | None:
+    """The competitors with 3 % of the weight of the best one and more."""
+    kept = of.weight >= _NOTABLE * of.weight[0]
+    if np.count_nonzero(kept) < 2:
+        return None
+    family, every = of.family, [c for c, keep in zip(of.every, kept) if keep]
+    one = _parameters(plain, Average(family.model, every[0].mean, every[0].covariance, frozenset()), fitted)
+    one = one[np.zeros(len(every), dtype=int)]
+    values, matrices = np.array([c.mean for c in every]), np.array([c.covariance for c in every])
+    return family.model, replace(one, value=values, covariance=matrices), of.weight[kept]
 
 
 def _as_fitted(

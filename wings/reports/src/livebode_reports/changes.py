@@ -7,7 +7,7 @@ from math import hypot, isfinite
 
 import numpy as np
 
-from livebode.analysis import Margins, OpenLoop, against_lines, fit_averaged, margins
+from livebode.analysis import Margins, against_lines, fit_averaged, margins_of
 from livebode.configuration import FitSection, LoopSection, recorded_configuration
 from livebode.core import INTERVAL_FACTOR, LivebodeError, normal_quantile
 from livebode.dataclass import dataclass
@@ -107,8 +107,7 @@ def _margins(fit: Fit, loop: LoopSection) -> Margins | None:
     built = loop.build(fit.rate_hz)
     if built.feedback is None:
         return None
-    fit = fit.with_unseen()
-    result = margins(fit.parameters, OpenLoop(fit.model, built, fit.rate_hz, fit.hold), fit.band_hz)
+    result = margins_of(fit, built)
     return result if fit.measured is None else against_lines(result, fit.measured, built)
 
 
