@@ -146,14 +146,8 @@ nb::tuple judge_periods(const Plan &of, nb::tuple state, nb::tuple periods, nb::
     const Array before(periods[3], REAL, {lines}), against(periods[4], FLAG, {kinds, lines});
     Rare rare{periods[5], periods[6], nullptr};
     const std::unique_ptr<double[]> scratch(new double[lb_repeating_scratch(&plan)]);
-    const lb_periods in = {count,
-                           every.data<double>(),
-                           usable,
-                           moves,
-                           before,
-                           against,
-                           scratch.get(),
-                           {&rare, Rare::step, Rare::chance}};
+    const lb_periods in = {
+        count, every.data<double>(), usable, moves, before, against, scratch.get(), {&rare, Rare::step, Rare::chance}};
 
     const size_t rows = count + 1;
     const Array distortion(out[0], REAL, {rows, lines}, WRITE), reasons(out[1], FLAG, {rows, kinds, lines}, WRITE);
