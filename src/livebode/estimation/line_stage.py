@@ -80,7 +80,7 @@ class LineStage(StatefulBase):
             name = settings.input or ""
             self._periodicity = Periodicity(lines, self._places, name, self._events)
         self._change = self._variation = None
-        if settings.average:
+        if settings.average and settings.forgetting < 1:  # an average that remembers all is judged at its end
             self._change = LastingChange(lines, self._events)
             self._variation = PeriodicVariation(lines, max(lines.window, settings.step), self._events)
         self._moving = 0
