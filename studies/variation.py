@@ -5,8 +5,7 @@ changes evenly, settles, steps or varies periodically, by 1 to 10 %, with white 
 as windows and with `--average`. The table has for each case how many recordings are reported; the share of the
 responses at random moments within one and two sigma of the mean; sigma over the least that covers 63 % within one and
 98 % within two, median; and the noise and the standard deviation over the recording over the true ones, median.
-`--recordings FOLDER` leaves out one period after the other of a real recording instead, and prints how many are within
-the bounds of the mean of the others.
+For real recordings see `studies.leave_one_out`.
 """
 
 from __future__ import annotations
@@ -14,15 +13,13 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
-from scipy.io import loadmat
 
 from livebode.arrays import Complex, Floats
-from livebode.core import Block, Channel, Lines, Response, Responses
+from livebode.core import Block, Channel, Lines, Response
 from livebode.estimation import Settings, Tracker
-from livebode.fitting import Drift, RunningMean, mean_response
+from livebode.fitting import Drift, RunningMean
 
 RATE_HZ, WINDOW, PERIODS = 1000.0, 200, 60
 LINES = Lines.parse("20:140:10", RATE_HZ, WINDOW)
@@ -123,46 +120,12 @@ def row(case: Callable[[np.random.Generator], Course], average: bool, seeds: ran
     )
 
 
-def left_out(responses: Responses) -> tuple[float, float]:
-    """Share of the periods within one and two sigma of the mean of the others, all lines; one response is a period.
-
-    A period has the noise of one window, and the machine at its moment.
-    """
-    within = []
-    for i in range(len(responses)):
-        others = mean_response(responses[np.delete(np.arange(len(responses)), i)])[0]
-        sigma = np.sqrt(others.sigma**2 + others.noise**2 * (len(responses) - 1))
-        ratio = (np.abs(responses.value[i] - others.value) / sigma)[others.valid & responses.valid[i]]
-        within.append([np.mean(ratio < 1), np.mean(ratio < 2)])
-    one, two = np.mean(within, axis=0)
-    return float(one), float(two)
-
-
-def print_left_out(folder: Path) -> None:
-    """Leave out one period after the other of the recording of two motors; a word if it is absent."""
-    file = folder / "motorbench" / "MultisineTypeA.mat"
-    if not file.is_file():
-        print(f"leave one period out: skipped, there is no {file}")
-        return
-    signals = loadmat(file)
-    rows = [np.ravel(signals[name])[3 * 2500 :].astype(np.float64) for name in ("iq_refx", "iq_adx", "theta_mx")]
-    lines = Lines(tuple(range(11, 251)), 2500, 2500.0)
-    settings = Settings(lines=lines, output="y", input="u", excitation="w", hop=2500)
-    responses = Tracker(settings).process(Block(np.array(rows), tuple(map(Channel, "wuy")), 2500.0))
-    one, two = left_out(responses[np.flatnonzero(responses.valid.any(axis=1))])
-    print(f"leave one period out, {file.name}: {100 * one:.1f} % within 1 sigma, {100 * two:.1f} % within 2 sigma")
-
-
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--runs", type=int, default=500)
     parser.add_argument("--seed", type=int, default=1000)
-    parser.add_argument("--recordings", type=Path, help="folder of recordings: only leave one period out")
     options = parser.parse_args()
-    if options.recordings is not None:
-        print_left_out(options.recordings)
-        return
     print(f"{options.runs} recordings a case, of {PERIODS} periods, {len(LINES)} lines")
     print("  ".join(f"{cell:>9}" for cell in HEADER))
     seeds = range(options.seed, options.seed + options.runs)

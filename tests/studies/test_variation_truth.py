@@ -2,24 +2,14 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-from livebode.core import Block, Channel
-from livebode.estimation import Settings, Tracker
 from studies.variation import (
     HEADER,
-    LINES,
-    RATE_HZ,
-    WINDOW,
     averaged,
-    left_out,
     periodic,
-    print_left_out,
     recorded,
-    rest,
     row,
     step,
 )
@@ -48,14 +38,3 @@ def test_a_periodic_change_has_its_frequency() -> None:
 def test_a_row_has_all_columns() -> None:
     cells = row(step, True, range(2))
     assert (len(cells), cells[0], cells[2]) == (len(HEADER), "step", "100.0 %")
-
-
-def test_a_period_of_a_machine_at_rest_is_as_far_from_the_others_as_noise(capsys: pytest.CaptureFixture[str]) -> None:
-    """63.2 % and 98.2 % of 780 periods and lines, within 4 standard deviations of such shares (7 % and 2 %)."""
-    settings = Settings(lines=LINES, output="y", input="u", excitation="w", hop=WINDOW)
-    of = recorded(rest, np.random.default_rng(11))
-    one, two = left_out(Tracker(settings).process(Block(of.samples, tuple(map(Channel, "wuy")), RATE_HZ)))
-    assert abs(one - 0.632) < 0.07
-    assert abs(two - 0.982) < 0.02
-    print_left_out(Path("missing"))
-    assert "skipped" in capsys.readouterr().out

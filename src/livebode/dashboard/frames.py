@@ -57,8 +57,7 @@ def frame(kind: str, axis: int, responses: Responses) -> bytes:
         size = np.where(use, np.abs(responses.value), np.nan)
         magnitude = 20 * np.log10(size)
         reach = responses.bound() / size
-        alone = np.sqrt(np.maximum(responses.sigma**2 - responses.distortion**2, 0.0))
-        noise = widened(alone, responses.dof[:, np.newaxis], CIRCLE_FACTOR) / size
+        noise = widened(responses.noise, responses.dof[:, np.newaxis], CIRCLE_FACTOR) / size
         phase = np.where(use, np.degrees(np.angle(responses.value)), np.nan)
     if rows <= _WHOLE_PHASE_ROWS:
         phase = np.array([unwrapped(p, np.nan_to_num(r) >= 1) for p, r in zip(phase, reach)]).reshape(rows, columns)

@@ -79,15 +79,8 @@ class Transfer(NamedTuple):
             poles[poles == 0] = _TINY**0.1  # a pole that friction hardly moves: equivalent to an integrator
             weights = (self._residues(poles) / poles)[..., np.newaxis, :]
             poles = poles[..., np.newaxis] * tick
-            with np.errstate(over="ignore"):  # of a trial far from stable, which its search leaves again
-                end: Any = np.expm1(poles)
-            sampled = 1 / ((z - 1)[..., np.newaxis, :] - end)
-            if late is None:
-                weights = weights * end[..., np.newaxis, :, 0]
-            else:
-                soon = np.expm1(poles * (1 - late))
-                sampled *= soon + (end - soon) / z[..., np.newaxis, :]
-            response = (weights @ sampled)[..., 0, :]
+            with np.errstate(over="ignore", invalid="ignore"):  # of a trial far from stable; its search leaves it
+                response = _held(weights, poles, z, late)
         for order, weight in enumerate(self._at_rest(), 1):
             response = response + weight[..., np.newaxis] * _integrated(order, z, tick, late)
         if np.any(whole):
@@ -165,6 +158,18 @@ def _valued(polynomial: Floats, places: Complex) -> Complex:
     for i in range(1, polynomial.shape[-1]):
         value = value * places + polynomial[..., i]
     return np.asarray(value)
+
+
+def _held(weights: Complex, poles: Complex, z: Complex, late: Floats | None) -> Complex:
+    """Sum of the sampled responses of poles·T, (..., poles, 1), with the weights r/p, (..., 1, poles)."""
+    end: Any = np.expm1(poles)
+    sampled = 1 / ((z - 1)[..., np.newaxis, :] - end)
+    if late is None:
+        weights = weights * end[..., np.newaxis, :, 0]
+    else:
+        soon = np.expm1(poles * (1 - late))
+        sampled *= soon + (end - soon) / z[..., np.newaxis, :]
+    return np.asarray((weights @ sampled)[..., 0, :])
 
 
 def _integrated(order: int, z: Complex, tick: float, late: Floats | None) -> Complex:
