@@ -251,11 +251,20 @@ def assembled(
     blank = _Blank(model, names, batches)
     if not best:
         return blank.without_fit(outs)
-    chosen = best[0]
-    raw = np.concatenate([chosen.theta, chosen.linear.ravel()])
-    quantities = PoleQuantities(chosen.structure, outs.unit, names, blank.units, raw)
-    covariance = whole_covariance(outs, chosen) if covariance is None else covariance
-    parameters = blank.parameters(quantities, outs, chosen, covariance)
+
+    def judged(of: SeparatedFit) -> tuple[SeparatedFit, Floats, Parameters]:
+        raw = np.concatenate([of.theta, of.linear.ravel()])
+        quantities = PoleQuantities(of.structure, outs.unit, names, blank.units, raw)
+        of_raw = whole_covariance(outs, of) if covariance is None else covariance
+        return of, of_raw, blank.parameters(quantities, outs, of, of_raw)
+
+    chosen, covariance_of_chosen, parameters = judged(best[0])
+    if parameters.status[0] == NOT_SEEN and chosen.structure.poles and covariance is None:
+        # The next one whose frequencies the lines determine.
+        others = (judged(of) for of in best[1:])
+        chosen, covariance_of_chosen, parameters = next(
+            (other for other in others if other[2].status[0] == OK), (chosen, covariance_of_chosen, parameters)
+        )
     residual = np.where(outs.measured.use, outs.measured.value - chosen.response, 0.0) * chosen.weight
     correlated = np.array([neighbours(weighted[use]) for weighted, use in zip(residual, outs.measured.use)])
     limit = RUNS / np.sqrt(2 * np.count_nonzero(outs.measured.use, axis=1))
@@ -264,7 +273,7 @@ def assembled(
         parameters, chosen.epsilon, _reduced_chi2(outs, chosen), correlated,
         tuple(name for name, high in zip(names, correlated > limit) if high), specified,
         outs.enough_for(replace(chosen.structure, pairs=chosen.structure.pairs + 1)),
-        _magnitude(outs), outs.chart, covariance,
+        _magnitude(outs), outs.chart, covariance_of_chosen,
     )  # fmt: skip
 
 

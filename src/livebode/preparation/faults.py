@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from livebode.arrays import Floats, Integers
+from livebode.arrays import Flags, Floats, Integers
 from livebode.core import Block, Event, SignalError, step_of
 from livebode.dataclass import dataclass
 from livebode.estimation import RepeatedSpikes, Settings, TurningSpikes
@@ -33,6 +33,7 @@ _OF_SIGNAL = 1e-5  # smaller spikes change no digit that is shown
 _MOST, _MOST_TRIED, _SHARE_MAX = 24, 64, 1 / 50  # samples of a period, and of all: more are no spikes
 _ROW_MAX, _LONGER = 4, 0.1  # samples in a row, and what each more has to explain, relative to the first
 _MEDIAN, _NOISY, _ABOVE = 1.25, 3.0, 5.0  # noise of a median over a mean's, and what remains over it; spikes over that
+_IN_MEAN = 0.3  # of a spike of the median, in the mean: it is in at least half of the periods
 _FREE_MIN = 0.25  # of the bins: with fewer beside the lines, a spike cannot be told from the response
 _GAUSS_90 = 1.645  # of a Gaussian, |x| in standard deviations that nine of ten samples are below
 _NEAR, _HIGH_OF_ONE = 4, 8.0  # samples on each side to compare with, and robust standard deviations of a sample
@@ -95,7 +96,7 @@ class FaultSearch:
         if count < _PERIODS_MIN or not self._settings.periodic:
             return []
         rows = rows[:, : count * window]
-        if self._settings.schedule and moves(rows[-1], window):
+        if self._settings.schedule and (moves(rows[-1], window) or _changes_place(rows[-1].reshape(count, window))):
             return []
         output = self.names.index(self._settings.output)
         reference = rows[self.names.index(str(self._settings.channel(self._settings.method.reference)))]
@@ -104,25 +105,36 @@ class FaultSearch:
         found: list[RepeatedSpikes | TurningSpikes] = []
         for name, x in zip(self.names, rows):
             if name not in self._settings.differenced and np.isfinite(x).any():
-                found += self._spikes(name, cut(filled(x), window), self._first + transient * window)
+                whole = np.isfinite(x).reshape(-1, window).all(axis=1)
+                found += self._spikes(name, cut(filled(x), window), whole, self._first + transient * window)
         return found
 
-    def _spikes(self, name: str, blocks: Floats, first: int) -> list[RepeatedSpikes | TurningSpikes]:
-        """The spikes of a channel in these periods, of which the first sample has this number."""
+    def _spikes(self, name: str, blocks: Floats, whole: Flags, first: int) -> list[RepeatedSpikes | TurningSpikes]:
+        """The spikes of a channel in those of these periods that are whole; the first sample has this number."""
         window = blocks.shape[1]
         together = 2 if len(blocks) >= 2 * _PERIODS_MIN else 1  # a spike at every second period is in half of them
         long = together * window
         excited = np.zeros(long // 2 + 1, dtype=np.bool_)
         excited[together * np.asarray(self._settings.lines.bins)] = True
-        pairs = blocks[: len(blocks) // together * together].reshape(-1, long)
-        places, sizes = repeated_spikes(pairs, excited)
+        used = len(blocks) // together * together
+        pairs = blocks[:used].reshape(-1, long)[whole[:used].reshape(-1, together).all(axis=1)]
         found: list[RepeatedSpikes | TurningSpikes] = []
+        if len(pairs) * together < _PERIODS_MIN:
+            return found
+        places, sizes = repeated_spikes(pairs, excited)
         if places.size:
             repeated = RepeatedSpikes(name, (places + first) % long, sizes, long)
             found.append(repeated)
             blocks = blocks - repeated.of(first, first + blocks.size).reshape(blocks.shape)
-        samples, sizes = turning_spikes(blocks)
+        samples, sizes = turning_spikes(blocks[whole])
+        samples = np.flatnonzero(whole)[samples // window] * window + samples % window
         return [*found, TurningSpikes(name, samples + first, sizes)] if samples.size else found
+
+
+def _changes_place(schedule: Floats) -> bool:
+    """Whether the places of the periods differ by more than the machine moves within one, shape (periods, window)."""
+    known = schedule[np.isfinite(schedule).all(axis=1)]
+    return known.size > 0 and float(np.ptp(known.mean(axis=1))) > float(np.median(np.ptp(known, axis=1)))
 
 
 def _has_levels(reference: Floats) -> bool:
@@ -200,6 +212,9 @@ def repeated_spikes(blocks: Floats, excited: np.ndarray) -> tuple[Integers, Floa
     if _deviation(left) > _NOISY * noise and least_found <= _ABOVE * np.abs(left).max():
         return nothing
     large = np.abs(sizes) > max(_SMALL * _deviation(left), least / 10)
+    # The median of different machines, or places, has peaks that their mean has not.
+    mean = np.fft.irfft(np.where(free, np.fft.rfft(blocks.mean(axis=0)), 0), window)
+    large &= np.sign(sizes) * _fitted(mean, places, kernel)[0] > _IN_MEAN * np.abs(sizes)
     return (places[large], _fitted(rest, places[large], kernel)[0]) if large.any() else nothing
 
 
