@@ -42,7 +42,7 @@ def aircraft(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     """Elevator to pitch rate, angle of attack and normal acceleration: one short period, without integrators."""
     rate_hz, window = 50.0, 1000
     lines = Lines.parse("0.2:6:0.2", rate_hz, window)
-    u = np.resize(multisine(lines), 7 * window)
+    u = np.resize(multisine(lines), 9 * window)
     a, b = np.array([[-1.0, 0.96], [-16.0, -1.5]]), np.array([[-0.1], [-12.0]])
     system = control.ss(a, b, np.array([[0.0, 1.0], [1.0, 0.0], [-15.0, 0.0]]), np.array([[0.0], [0.0], [-1.5]]))
     y = driven(system, u, rate_hz)

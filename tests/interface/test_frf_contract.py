@@ -151,7 +151,8 @@ def test_welch_uses_the_whole_of_the_signals() -> None:
 
 
 def test_missing_samples_cost_their_windows_and_are_a_warning_at_the_call() -> None:
-    w, u, y = (np.tile(x, 2) for x in signals())  # ten periods are a whole number of seconds
+    longer = livebode.example_axis(2.0).run()[0]
+    w, u, y = (longer[name].copy() for name in NAMES)
     y[3000:3010] = np.nan
     with pytest.warns(SignalWarning, match="not finite") as caught:
         response = livebode.frf(w, u, y, fs=RATE_HZ)

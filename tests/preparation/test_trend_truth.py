@@ -144,7 +144,8 @@ def test_a_drifting_output_gives_the_response_within_its_bounds(name: str, tmp_p
     assert drifting.average.valid.all()
     assert errors(drifting).max() < 3.1  # 7 lines: once in 2,000 runs
     wider = np.median(drifting.average.sigma / plain.average.sigma)
-    assert wider < (1.2 if name != "sine" else 10)  # a period of it is three windows: (π/3)⁴/36 of it remain
+    # A period of the sine is three windows: (π/3)⁴/36 of it remain, and are contained as a variation.
+    assert wider < (1.2 if name != "sine" else 20)
 
 
 def test_a_differenced_channel_keeps_its_trend_and_so_does_one_that_is_configured_so(tmp_path: Path) -> None:

@@ -52,7 +52,7 @@ def tracked(path: Path, folder: Path, output: str, input: str) -> RunRecord:
         "source": {"log": path, "rate_hz": RATE_HZ} | ({"dbc": dbc} if (dbc := path.with_name(DBC)).exists() else {}),
         "signals": {"output": output, "input": input},
         "lines": {"frequencies": "k=4:9:5", "window": WINDOW},
-        "tracking": {"estimator": "direct", "hop": WINDOW},
+        "tracking": {"estimator": "direct", "hop": WINDOW, "trend": "keep"},  # some signals are ramps
     }
     return RunRecord.open(run(Axis.of(given, "test"), Destination(folder, lambda *_: None)).directory)
 

@@ -119,6 +119,14 @@ def direct_tracker() -> Case:
     return Case(new, processed(cut(block(), 333, 777, 1100)), [lambda: new(2 * WINDOW)])
 
 
+def averaging_tracker() -> Case:
+    def new(window: int = WINDOW) -> Tracker:
+        lines = Lines.parse("20:140:20", rate_hz=RATE_HZ, window=window)
+        return Tracker(Settings(lines=lines, input="u", output="y", excitation="w", hop=10, average=True))
+
+    return Case(new, processed(cut(block(), 333, 777, 1100)), [lambda: new(2 * WINDOW)])
+
+
 def _nonperiodic(estimator: str) -> Case:
     def new(forgetting: float = 0.8) -> NonPeriodicTracker:
         return NonPeriodicTracker(
@@ -439,7 +447,8 @@ def stream_position() -> Case:
 CASES = {
     case.__name__: case
     for case in (
-        tracker, direct_tracker, successive_trackers, matrix_tracker, matrix_columns, matrix_monitor, matrix_detection,
+        tracker, direct_tracker, averaging_tracker, successive_trackers,
+        matrix_tracker, matrix_columns, matrix_monitor, matrix_detection,
         local_polynomial, welch_average, spectra_tracker,
         uneven_tracker, motion_correction, fitter, drift, monitor_by_model, monitor_by_tables, change_detection, fits,
         torque_monitor, run_counts, readiness, sequencer, axis_stream, stream_position,

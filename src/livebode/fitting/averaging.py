@@ -11,7 +11,7 @@ from livebode.arrays import Floats
 from livebode.dataclass import dataclass
 from livebode.fitting.competitors import Competition, Competitor
 from livebode.fitting.extended import MODE, ExtendedModel
-from livebode.fitting.family import Member
+from livebode.fitting.family import FamilyMember
 from livebode.fitting.physical import PhysicalModel
 
 _SHARE = 0.03  # least weight of all models with an effect, from which the average over all has it
@@ -80,7 +80,7 @@ def _about(of: Competition, centre: Sequence[Competitor], effects: Collection[st
         for name in ("mode", "mode_damping"):
             apart[:, family.index(name)] *= there
     matrix = np.einsum("m,mij->ij", of.weight, matrices) + np.einsum("m,mi,mj->ij", of.weight, apart, apart)
-    moved = family.free(Member(frozenset(effects), damped=True))
+    moved = family.free(FamilyMember(frozenset(effects), damped=True))
     for name, value in family.specified.items():
         if not moved[family.index(name)]:
             mean[family.index(name)] = value

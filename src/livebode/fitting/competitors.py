@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from livebode.arrays import Complex, Floats
 from livebode.dataclass import dataclass
 from livebode.fitting.extended import BEYOND, LAG, MODE, RESIDUAL
-from livebode.fitting.family import NEAR_NYQUIST, Family, FittedMember, Member
+from livebode.fitting.family import NEAR_NYQUIST, Family, FamilyMember, FittedMember
 from livebode.fitting.physical import DELAY
 from livebode.fitting.problem import MeasuredRows, Problem
 from livebode.fitting.rows import FittedRows, line_weights
@@ -79,11 +79,11 @@ def compete(
     window, until no model in it is new.
     """
     family = Family(problem, allowed.fixed, allowed.delay, allowed.top_hz, fitted.ended[0])
-    start = Member(frozenset({DELAY} if late and allowed.delay else ()))
+    start = FamilyMember(frozenset({DELAY} if late and allowed.delay else ()))
     values = family.without(family.padded(fitted.ended[0]), start)
     first = family.fitted([(start, values, float(fitted.epsilon[0]))], measured, noise_dof)[0]
-    known: dict[Member, FittedMember] = {start: first}
-    done: set[Member] = set()
+    known: dict[FamilyMember, FittedMember] = {start: first}
+    done: set[FamilyMember] = set()
     lines = int(np.count_nonzero(measured.use))
     for _ in range(_LEVELS):
         order = sorted(known, key=lambda m: known[m].misfit + price(m, lines))
@@ -104,7 +104,7 @@ def compete(
     return _weighed(family, first, list(known.values()), measured, noise_dof)
 
 
-def price(member: Member, lines: int) -> float:
+def price(member: FamilyMember, lines: int) -> float:
     """Decrease of −2·ln(likelihood) that the effects of a model must bring."""
     frictions = len(member.effects) - sum(name in _PRICE for name in member.effects)
     total = sum(_PRICE.get(name, 0.0) for name in member.effects) + _FRICTION_PRICE * (frictions > 0)
@@ -116,7 +116,7 @@ def price(member: Member, lines: int) -> float:
     return total
 
 
-Start = tuple[Member, Floats, float]
+Start = tuple[FamilyMember, Floats, float]
 
 
 def _neighbours(family: Family, of: FittedMember, measured: MeasuredRows) -> Iterator[Start]:
@@ -124,15 +124,15 @@ def _neighbours(family: Family, of: FittedMember, measured: MeasuredRows) -> Ite
     effects, damped, held_at = of.member
     for name in family.effects:
         if name in effects:
-            less = Member(effects - {name}) if name == MODE else of.member._replace(effects=effects - {name})
+            less = FamilyMember(effects - {name}) if name == MODE else of.member._replace(effects=effects - {name})
             yield less, _without(family, of, less, name), of.epsilon
         elif name == MODE and RESIDUAL not in effects:
-            more = Member(effects | {MODE})
+            more = FamilyMember(effects | {MODE})
             yield from ((more, family.without(start, more), of.epsilon) for start in _mode_starts(family, of, measured))
         elif name != MODE and not (name == RESIDUAL and MODE in effects):
             yield of.member._replace(effects=effects | {name}), _with(family, of, name), of.epsilon
     for place in family.held_at if RESIDUAL in effects else ():
-        other = Member(effects - {RESIDUAL} | {MODE}, held_at=place)
+        other = FamilyMember(effects - {RESIDUAL} | {MODE}, held_at=place)
         yield other, family.without(of.values, other), of.epsilon
     if MODE in effects and not held_at:
         other = of.member._replace(damped=not damped)
@@ -153,7 +153,7 @@ def _with(family: Family, of: FittedMember, name: str) -> Floats:
     return values
 
 
-def _without(family: Family, of: FittedMember, less: Member, name: str) -> Floats:
+def _without(family: Family, of: FittedMember, less: FamilyMember, name: str) -> Floats:
     """Values without an effect; of delay and lag the other one takes it over."""
     values = family.without(of.values, less)
     other = {DELAY: LAG, LAG: DELAY}.get(name)

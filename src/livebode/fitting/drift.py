@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from livebode.arrays import Complex, Flags, Floats
 from livebode.core import Lines, Response, Responses, Stage, StatefulBase
 from livebode.dataclass import dataclass
-from livebode.fitting.time_course import FALSE_ALARM, GROUPS_MIN, Component, Course, Series, components_of
+from livebode.fitting.time_course import FALSE_ALARM, GROUPS_MIN, Component, Course, GroupSeries, components_of
 
 _MOVED = 1e-3  # of the largest value of the schedule
 _VALUES_MAX, _GROUPS = 1 << 16, (64, 512)  # when all groups are full, neighbours are added: memory does not grow
@@ -94,7 +94,7 @@ class Drift:
             away=np.zeros((_MOMENTS, n), dtype=np.complex128),
         )
 
-    def add(self, series: Series, remembered: float) -> None:
+    def add(self, series: GroupSeries, remembered: float) -> None:
         """Fit the components, or a straight line, at the lines of a series; of averages, as long as they remember."""
         at = series.at
         course = Course.of(series, self.components or [Component("trend", 1)])
@@ -322,7 +322,7 @@ class DriftTest(StatefulBase):
             found.add(each, remembered)
         return found
 
-    def _series(self) -> tuple[list[Series], float, float]:
+    def _series(self) -> tuple[list[GroupSeries], float, float]:
         """The lines by the groups in which they have windows; begin and length of the record."""
         used = self._pairs[0].real > 0
         if not used.any():
@@ -340,7 +340,7 @@ class DriftTest(StatefulBase):
             rows = np.flatnonzero(pattern)
             if rows.size and length_s > 0:
                 share = (time_s[rows, at[0]] - begin_s) / length_s
-                series.append(Series(at, share, self._pairs[0][rows, at[0]].real, value[np.ix_(rows, at)]))
+                series.append(GroupSeries(at, share, self._pairs[0][rows, at[0]].real, value[np.ix_(rows, at)]))
         return series, begin_s, length_s
 
     @property

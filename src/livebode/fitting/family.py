@@ -32,7 +32,7 @@ def _row(of: Solution, i: int) -> Solution:
     return Solution(of.values[row], of.response[row], of.slope[row], of.settled[row])
 
 
-class Member(NamedTuple):
+class FamilyMember(NamedTuple):
     """A model of the family: its effects, whether the damping of its further mode is free, and the frequency at which
     that mode is held, over the highest line; zero where it is fitted."""
 
@@ -55,7 +55,7 @@ class FittedMember:
         Of one row, with the slopes by all free parameters of the family.
     """
 
-    member: Member
+    member: FamilyMember
     values: Floats
     free: NDArray[np.bool_]
     dof: float
@@ -107,7 +107,7 @@ class Family:
     def index(self, name: str) -> int:
         return self.names.index(name)
 
-    def free(self, member: Member) -> NDArray[np.bool_]:
+    def free(self, member: FamilyMember) -> NDArray[np.bool_]:
         """Which parameters a member fits."""
         free = self._always.copy()
         for effect in member.effects:
@@ -118,7 +118,7 @@ class Family:
                 free[self.index(name)] = fitted
         return free
 
-    def without(self, values: Floats, member: Member) -> Floats:
+    def without(self, values: Floats, member: FamilyMember) -> Floats:
         """Values with those parameters at rest that this member does not have."""
         values = np.array(values)
         for effect in self.effects:
@@ -138,7 +138,7 @@ class Family:
 
     def fitted(
         self,
-        tried: Iterable[tuple[Member, Floats, float]],
+        tried: Iterable[tuple[FamilyMember, Floats, float]],
         measured: MeasuredRows,
         noise_dof: Floats,
     ) -> list[FittedMember]:

@@ -55,7 +55,7 @@ class Component:
 
 
 @dataclass(frozen=True, eq=False)
-class Series:
+class GroupSeries:
     """The response at lines that have values at the same moments.
 
     Attributes
@@ -77,7 +77,7 @@ class Series:
 class _Remainder:
     """What chosen components leave of a series; rows are weighted, so that white noise has equal power in all."""
 
-    def __init__(self, of: Series) -> None:
+    def __init__(self, of: GroupSeries) -> None:
         self.share, self.at, self._weight = of.share, of.at, np.sqrt(of.count)
         self._basis = np.empty((len(of.share), 0))
         self._left = of.value * self._weight[:, np.newaxis]
@@ -141,22 +141,26 @@ class _Remainder:
 
 def _log_chance(explained: Floats, left: Floats, functions: int, free: Floats | float) -> Floats:
     """ln of the probability that F(2·functions, 2·free) is as large, for at most three functions."""
-    x = np.clip(explained / (explained + left), 0.0, 1.0)
+    total = explained + left
+    some = total > 0  # a response of zero changes by nothing
+    x = np.divide(explained, total, out=np.zeros_like(total), where=some).clip(0.0, 1.0)
+    rest = np.divide(left, total, out=np.ones_like(total), where=some)
     terms = [np.ones_like(x), free * x, free * (free + 1) / 2 * x**2][:functions]
-    return np.asarray(free * np.log(left / (explained + left)) + np.log(np.sum(terms, axis=0)))
+    return np.asarray(free * np.log(rest) + np.log(np.sum(terms, axis=0)))
 
 
 def _families(share: Floats) -> Iterator[tuple[float, list[Component]]]:
     """Components that are tried, in families with their part of the false alarms."""
     yield 0.25, [Component("trend", 1)]
     yield 0.125, [Component("trend", 3)]
-    yield 0.125, [Component("settling", tau) for tau in _TAUS]
+    # What settles within a group is seen in one of them only, and its beginning is not known.
+    yield 0.125, [Component("settling", tau) for tau in _TAUS if tau * len(share) >= 1]
     yield 0.25, [Component("step", float(x)) for x in (share[1:-2] + share[2:-1]) / 2]
     cycles = np.arange(2, len(share) + 1) / 2
     yield 0.25, [Component("periodic", float(1 / c)) for c in cycles if c <= len(share) / 2]
 
 
-def components_of(series: Sequence[Series]) -> tuple[list[Component], Floats]:
+def components_of(series: Sequence[GroupSeries]) -> tuple[list[Component], Floats]:
     """The components that noise does not explain, the clearest first, and ln of the chance of each line's share.
 
     Each step tries all families on what the components before leave. A candidate explains power at each line, of which
@@ -232,7 +236,7 @@ def _refined(left: Sequence[_Remainder], component: Component, moments: int) -> 
         cycles = 1 / component.place + np.linspace(-0.5, 0.5, _REFINED)
         places = 1 / cycles[(cycles >= 0.75) & (cycles <= moments / 2)]
     elif component.kind == "settling":
-        places = component.place * 2 ** np.linspace(-1, 1, _REFINED)
+        places = np.maximum(component.place * 2 ** np.linspace(-1, 1, _REFINED), 1 / moments)
     else:
         return component
     tried = [Component(component.kind, float(place)) for place in places]
@@ -265,7 +269,7 @@ class Course:
     scatter: Floats
 
     @classmethod
-    def of(cls, series: Series, components: Sequence[Component]) -> Course:
+    def of(cls, series: GroupSeries, components: Sequence[Component]) -> Course:
         functions = _functions(components, series.share) * np.sqrt(series.count)
         q, r = np.linalg.qr(functions.T)
         inverse = np.linalg.pinv(r)

@@ -13,7 +13,7 @@ from livebode.records.summary_file import COPY, RUN, is_run, read_summary
 
 _SHOWN = 5
 _PARTIAL = r"\.partial(-[0-9a-f]{8})?"  # of livebode.core.files
-_DRAWN = r"(bode|tracking|modes|margins|validation|singular-values|tune|friction|orders)\.svg"
+_DRAWN = r"(bode|tracking|modes|margins|validation|singular-values|tune|friction|orders|stabilisation)\.svg"
 _PROPOSED = r"gains\.(toml|csv)|filters\.(h|st)|odrive\.txt|shaper\.(h|st|cfg)"
 _REPLACED = rf"(run|run-copy|references|notes|loop-check|tune)\.json|report\.(html|pdf)|{_DRAWN}|{_PROPOSED}"
 _FILES = re.compile(
