@@ -59,7 +59,8 @@ def test_frames_hold_the_responses(responses: Responses) -> None:
     assert (first["kind"], first["axis"], second["kind"]) == ("rows", 3, "newest")
     use, size = responses.valid & np.isfinite(responses.value), np.abs(responses.value)
     with np.errstate(invalid="ignore"):
-        alone = np.sqrt(responses.sigma**2 - responses.distortion**2)
+        others = np.nan_to_num(responses.distortion) ** 2 + np.nan_to_num(responses.variation) ** 2
+        alone = np.sqrt(np.maximum(responses.sigma**2 - others, 0.0))
         expected = {
             "magnitude": np.where(use, responses.magnitude_db, np.nan),
             "reach": np.where(use, responses.bound() / size, np.nan),

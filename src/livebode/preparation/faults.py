@@ -37,6 +37,7 @@ _IN_MEAN = 0.3  # of a spike of the median, in the mean: it is in at least half 
 _FREE_MIN = 0.25  # of the bins: with fewer beside the lines, a spike cannot be told from the response
 _GAUSS_90 = 1.645  # of a Gaussian, |x| in standard deviations that nine of ten samples are below
 _NEAR, _HIGH_OF_ONE = 4, 8.0  # samples on each side to compare with, and robust standard deviations of a sample
+_SUDDEN = 4.0  # times the median deviation of the samples around: at the top of a parabola 1, of noise 12
 _FEW = 0.25  # of the periods: so many are left out as a whole, if one differs
 
 
@@ -250,10 +251,13 @@ def _high(window: int) -> float:
 def turning_spikes(blocks: Floats) -> tuple[Integers, Floats]:
     """Samples, and sizes, of spikes that are in many of the periods, each at another place; shape (periods, window)."""
     apart = (blocks - np.median(blocks, axis=0)).ravel()
-    padded = np.pad(apart, _NEAR, mode="edge")
-    apart = apart - np.median(np.lib.stride_tricks.sliding_window_view(padded, 2 * _NEAR + 1), axis=1)
+    near = np.lib.stride_tricks.sliding_window_view(np.pad(apart, _NEAR, mode="edge"), 2 * _NEAR + 1)
+    apart = apart - np.median(near, axis=1)
     deviation = _usual(apart)
     samples = np.flatnonzero(np.abs(apart) > _HIGH_OF_ONE * deviation)
+    # A slow signal differs from its median at its tops only, where its neighbours do, too.
+    beside = near[samples] - np.median(near[samples], axis=1, keepdims=True)
+    samples = samples[np.abs(apart[samples]) > _SUDDEN * np.median(np.abs(beside), axis=1)]
     periods = np.unique(samples // blocks.shape[1]).size
     if deviation == 0 or periods <= _FEW * len(blocks) or samples.size > _SHARE_MAX * apart.size:
         return np.zeros(0, dtype=np.int64), np.zeros(0)
