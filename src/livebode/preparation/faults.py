@@ -17,11 +17,8 @@ from livebode.preparation.aligned import AlignedLog
 
 _PERIODS_MIN = 4
 _RUN = 3  # equal samples in a row: fewer are by chance
-_AROUND, _PILED, _PILED_HIGH = (
-    5.5,
-    5.0,
-    12.0,
-)  # steps around a value, and times the samples there: at a parabola's top 7
+_AROUND = 5.5  # steps around a value
+_PILED, _PILED_HIGH = 5.0, 12.0  # times the samples there: at a parabola's top 7
 _ABRUPT = 1.5  # step at the end of a run over that at the top of a parabola with such a run
 _LEAST, _LEAST_SHARE = 4, 0.01  # samples of a period, and of all, at zero that are no run
 _LEVELS = 0.8  # rms over peak: of a sine 0.7, of a binary sequence 1
@@ -78,15 +75,14 @@ class FaultSearch:
         self._settings, self._first = settings, first
         self.names = list(dict.fromkeys(name for role in settings.roles if (name := settings.channel(role))))
         self.channels = list(dict.fromkeys([*self.names, *([settings.schedule] if settings.schedule else [])]))
-        self._limit = EXAMINED_SAMPLES_MAX
         self._parts: list[Floats] = []
-        self._count, self._begins = 0, first
+        self._count = 0
 
     def process(self, block: Block) -> None:
         """Add the next samples of `channels`, of the first stretch without a gap."""
-        if self._count >= self._limit or block.start != self._begins + self._count:
+        if self._count >= EXAMINED_SAMPLES_MAX or block.start != self._first + self._count:
             return
-        self._parts.append(block.rows(self.channels)[:, : self._limit - self._count])
+        self._parts.append(block.rows(self.channels)[:, : EXAMINED_SAMPLES_MAX - self._count])
         self._count += self._parts[-1].shape[1]
 
     def finish(self, transient: int = 0) -> list[RepeatedSpikes | TurningSpikes]:
