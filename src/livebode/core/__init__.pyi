@@ -12,6 +12,9 @@ from livebode.core._frequency_response import PER_LINE as PER_LINE
 from livebode.core._frequency_response import PlotKind as PlotKind
 from livebode.core._frequency_response import Quantity as Quantity
 from livebode.core._frequency_response import decibels as decibels
+from livebode.core._in_order import added as added
+from livebode.core._in_order import has_moved as has_moved
+from livebode.core._in_order import with_extremes as with_extremes
 from livebode.core._loop import CHANNELS_MAX as CHANNELS_MAX
 from livebode.core._loop import Loop as Loop
 from livebode.core._loop import MatrixLoop as MatrixLoop

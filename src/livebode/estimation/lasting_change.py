@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Floats, Integers
-from livebode.core import INTERVAL_FACTOR, Event, Lines, Stage, StatefulBase, log_sum_exceeded
+from livebode.core import (
+    INTERVAL_FACTOR,
+    Event,
+    Lines,
+    Stage,
+    StatefulBase,
+    added,
+    has_moved,
+    log_sum_exceeded,
+    with_extremes,
+)
 from livebode.estimation.products import divided, magnitude, power, scaled, times
 from livebode.language import Message
 
@@ -19,7 +26,6 @@ _GROUPS_MIN = _GROUPS_MAX // 2
 _REFERENCE = 8  # windows before the first group
 _TESTS = 150  # of a run of ten minutes and windows of 0.1 s: sixteen each time that it becomes twice as long
 _SMALLEST = 1e-4  # of the response: what no noise explains and nobody needs
-_MOVED = 1e-3  # of the largest value of the schedule
 
 
 class LastingChange(StatefulBase):
@@ -170,19 +176,3 @@ def window_errors(reference: Complex, pair: Complex) -> Complex:
     with np.errstate(all="ignore"):
         error = divided(pair[0] - times(divided(reference[0], reference[1]), pair[1]), reference[1])
     return np.where(np.isfinite(error), error, 0.0)
-
-
-def with_extremes(extremes: Floats, values: Floats) -> Floats:
-    """Smallest and largest value so far; NaN without one."""
-    return np.array([np.fmin(extremes[0], np.fmin.reduce(values)), np.fmax(extremes[1], np.fmax.reduce(values))])
-
-
-def has_moved(extremes: Floats) -> bool:
-    """Whether a schedule with these extremes varies by more than a thousandth."""
-    low, high = extremes
-    return bool(high - low > _MOVED * max(abs(low), abs(high)))
-
-
-def added(sums: NDArray[Any], rows: NDArray[Any]) -> NDArray[Any]:
-    """Sums and rows, (…, rows, lines), added one after the other: as if they came one by one, to the bit."""
-    return np.asarray(np.cumsum(np.concatenate([sums[..., np.newaxis, :], rows], axis=-2), axis=-2)[..., -1, :])

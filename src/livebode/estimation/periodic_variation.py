@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from livebode.arrays import Complex, Floats, Integers
-from livebode.core import Event, Lines, Stage, StatefulBase, log_sum_exceeded
-from livebode.estimation.lasting_change import FALSE_ALARM, added, has_moved, window_errors, with_extremes
+from livebode.core import Event, Lines, Stage, StatefulBase, added, has_moved, log_sum_exceeded, with_extremes
+from livebode.estimation.lasting_change import FALSE_ALARM, window_errors
 from livebode.estimation.products import scaled
 from livebode.language import Message
 

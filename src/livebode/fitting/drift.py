@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Flags, Floats
-from livebode.core import Lines, Response, Responses, Stage, StatefulBase
+from livebode.core import Lines, Response, Responses, Stage, StatefulBase, added, has_moved, with_extremes
 from livebode.dataclass import dataclass
 from livebode.fitting.time_course import FALSE_ALARM, GROUPS_MIN, Component, Course, GroupSeries, components_of
 
-_MOVED = 1e-3  # of the largest value of the schedule
 _VALUES_MAX, _GROUPS = 1 << 16, (64, 512)  # when all groups are full, neighbours are added: memory does not grow
 _MOMENTS = 128  # of the record at which the course is evaluated
 _WITHIN = 1 - np.exp(-1), 1 - np.exp(-4)  # probability of noise within sigma, and within two
@@ -278,8 +276,7 @@ class DriftTest(StatefulBase):
 
     def _add(self, time_s: Floats, schedule: Floats, value: Complex, weight: Complex | Floats) -> None:
         """Add windows; `value` is NaN where it is invalid, shape (windows, lines)."""
-        low, high = np.fmin.reduce(schedule), np.fmax.reduce(schedule)
-        self._schedule = np.array([np.fmin(self._schedule[0], low), np.fmax(self._schedule[1], high)])
+        self._schedule = with_extremes(self._schedule, schedule)
         used = np.isfinite(value)
         times_s = np.where(used, time_s[:, np.newaxis], 0.0)
         pairs = np.where(used, np.stack([np.ones_like(value), value * weight, weight + 0j]), 0)
@@ -289,8 +286,8 @@ class DriftTest(StatefulBase):
                 self._merge()
             group = self._windows >> self._level
             stop = min(done + ((group + 1) << self._level) - self._windows, len(value))
-            self._times_s[:, group] = _added(self._times_s[:, group], times_s[np.newaxis, done:stop])
-            self._pairs[:, group] = _added(self._pairs[:, group], pairs[:, done:stop])
+            self._times_s[:, group] = added(self._times_s[:, group], times_s[np.newaxis, done:stop])
+            self._pairs[:, group] = added(self._pairs[:, group], pairs[:, done:stop])
             self._windows += stop - done
             done = stop
 
@@ -306,7 +303,7 @@ class DriftTest(StatefulBase):
         n = self._pairs.shape[2]
         with np.errstate(invalid="ignore", divide="ignore"):
             value = self._pairs[1].sum(axis=0) / self._pairs[2].sum(axis=0)
-        moved = np.ptp(self._schedule) > _MOVED * np.abs(self._schedule).max()
+        moved = has_moved(self._schedule)
         series, begin_s, length_s = self._series()
         long_enough = [each for each in series if len(each.share) >= GROUPS_MIN]
         if moved or not long_enough:
@@ -346,9 +343,3 @@ class DriftTest(StatefulBase):
     @property
     def _identity(self) -> str:
         return f"{self._window}"
-
-
-def _added(sums: NDArray[Any], rows: NDArray[Any]) -> NDArray[Any]:
-    """Sums, shape (kinds, lines), and rows of shape (kinds, rows, lines), added one after the other: as if they came
-    one by one, to the bit."""
-    return np.asarray(np.add.reduce(np.concatenate([sums[:, np.newaxis], rows], axis=1), axis=1))
