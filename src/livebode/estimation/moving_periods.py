@@ -117,7 +117,9 @@ class MovingPeriods(StatefulBase):
         if not self.is_possible or periods.schedule is None or not usable.any():
             self.end_stretch()
         else:
-            of_periods = times(spectra[self._signals][:, :, self._distortion.at], self._after)
+            # An incomplete period, which is not used, may be infinite.
+            at_bins = np.where(usable[:, np.newaxis], spectra[self._signals][:, :, self._distortion.at], 0)
+            of_periods = times(at_bins, self._after)
             groups, usable, last = self._grouped(of_periods, periods.schedule.mean(axis=1), usable)
             if last.size:
                 rows = self._distortion.process(groups, usable)
