@@ -166,7 +166,7 @@ def _determined(of: Structure, slope: Complex) -> Floats:
         + [(linear // 2 >= of.modes) & ((linear // 2 < of.pairs) | (linear >= of.linear - of.direct))] * of.outputs
     )
     firm, weak = np.flatnonzero(~loose), np.flatnonzero(loose)
-    scale = np.linalg.norm(slope[:, weak], axis=0) + 1e-300
+    scale = _sizes(slope[:, weak])
     _, size, axes = np.linalg.svd(stacked(slope[:, weak] / scale), full_matrices=False)
     held = size > _SINGULAR * size[0]
     known = np.zeros((of.size, firm.size + np.count_nonzero(held)))
@@ -187,12 +187,18 @@ def lost_without(outputs: Outputs, of: SeparatedFit) -> Floats:
     problem, lost = _WeightedFit(outputs, of.structure, of.weight), np.zeros(of.structure.pairs)
     for weight, (_, linear, columns, _) in zip(of.weight, problem.factors(of.theta)):
         left = stacked(weight[:, np.newaxis] * columns)
-        scale = np.linalg.norm(left, axis=0) + 1e-300
+        scale = _sizes(left)
         inverse = np.linalg.pinv(np.linalg.qr(left / scale)[1], rcond=1e-13)
         size = (linear * scale)[: 2 * of.structure.pairs].reshape(-1, 2)
         rows = inverse[: 2 * of.structure.pairs].reshape(-1, 2, inverse.shape[1])
         lost += np.einsum("pi,pij,pj->p", size, np.linalg.pinv(rows @ rows.swapaxes(1, 2)), size)
     return lost
+
+
+def _sizes(columns: NDArray[Any]) -> Floats:
+    """Norm of each column; 1 for one without values, of a pole far from all lines, whose weight stays finite."""
+    norm = np.linalg.norm(columns, axis=0)
+    return np.asarray(np.where(norm > 0, norm, 1.0))
 
 
 def stacked(values: NDArray[Any]) -> Floats:
@@ -239,7 +245,7 @@ class _WeightedFit:
             if columns is None or self.structure.delays:
                 columns = np.nan_to_num(self._shapes.columns(theta, float(delay_s)), posinf=0.0, neginf=0.0)
             left = stacked(weight[:, np.newaxis] * columns)
-            scale = np.linalg.norm(left, axis=0) + 1e-300
+            scale = _sizes(left)
             q, r = np.linalg.qr(left / scale)
             across = q.T @ right
             linear = np.linalg.lstsq(r, across, rcond=1e-13)[0] / scale

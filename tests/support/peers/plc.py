@@ -174,4 +174,6 @@ class NotifyPeer(AdsPeer):
             asked.source_net_id + asked.source_port + asked.target_net_id + asked.target_port
             + struct.pack("<HHIII", constants.ADSCOMMAND_DEVICENOTE, 4, len(stream), 0, 0) + stream
         )  # fmt: skip
+        if not self._server.clients:  # the connection has just ended
+            return
         self._server.clients[-1].client.sendall(struct.pack("<HI", 0, len(ams)) + ams)
