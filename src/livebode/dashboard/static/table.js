@@ -5,24 +5,31 @@ import { halfDeg, highDb, lowDb } from "./frames.js";
 import { tr } from "./language.js";
 import { byId as $, element } from "./make.js";
 import { nameOf } from "./names.js";
+import { PARTS } from "./parts.js";
 import { angle, bounds, frequency, halfAngle, level } from "./values.js";
-import { fixed } from "./words.js";
+import { fixed, plain } from "./words.js";
 
 /** @import { Bode } from "./bode.js" */
 /** @import { AtCursor, Curves } from "./messages.js" */
 
+/** The parts of a bound that are shown of a curve. @param {Bode} bode @param {Curves} name */
+const partsOf = ({ parted, parts }, name) =>
+  parted && name === "measured" ? [...PARTS.keys()].filter((part) => part === 0 || parts.has(part)) : [];
+
 /**
  * @param {AtCursor | undefined} value
  * @param {import("./view.js").View} view
+ * @param {number[]} parts
  */
-function cells(value, view) {
-  if (!value) return ["", "", ""];
+function cells(value, view, parts) {
+  if (!value) return ["", "", "", ...parts.map(() => "")];
   const { db, deg, reach, coherence } = value,
     known = Number.isFinite(reach) && lowDb(db, reach) > -999;
   return [
     known ? `${level(db, view)} (${bounds(lowDb(db, reach), db, highDb(db, reach), view)})` : level(db, view),
     Number.isFinite(reach) ? `${angle(deg)} ${halfAngle(halfDeg(reach))}` : angle(deg),
     Number.isFinite(coherence) ? fixed(coherence, 3) : "",
+    ...parts.map((part) => (Number.isFinite(reach) ? plain(100 * value.parts[part], 2) : "")),
   ];
 }
 
@@ -34,6 +41,7 @@ function filled(bode) {
     `${nameOf(name)}: ${tr("magnitude")}`,
     `${nameOf(name)}: ${tr("phase")}`,
     `${nameOf(name)}: ${tr("coherence")}`,
+    ...partsOf(bode, name).map((part) => `${nameOf(name)}: ${tr("{part}, %", { part: PARTS[part].words })}`),
   ]);
   return [
     element(
@@ -49,7 +57,9 @@ function filled(bode) {
           "tr",
           {},
           element("th", { scope: "row" }, frequency(hz, bode.view)),
-          ...names.flatMap((name) => cells(values[line][name], bode.view)).map((text) => element("td", {}, text)),
+          ...names
+            .flatMap((name) => cells(values[line][name], bode.view, partsOf(bode, name)))
+            .map((text) => element("td", {}, text)),
         ),
       ),
     ),
