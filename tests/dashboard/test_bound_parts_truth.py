@@ -132,7 +132,7 @@ def colour(tab: Tab, one: Response, line: int, reach: float) -> str:
         return "none"
     if blue > red + 40 and blue > green + 20:
         return "blue"
-    return "amber" if red > green > blue + 40 else "pink" if red > green + 20 and blue > green + 20 else "none"
+    return "yellow" if red > green > blue + 40 else "pink" if red > green + 20 and blue > green + 20 else "none"
 
 
 def test_the_parts_are_those_of_the_table(browser: Browser, drifting: Path) -> None:
@@ -165,7 +165,7 @@ def test_each_part_has_its_colour_and_the_switch_shows_the_whole(browser: Browse
     of_variation = (distorted + whole)[varying] / 2
     of_distortion = (0.2 * noise + 0.8 * distorted)[distorting]
     with page(browser, drifting) as tab:
-        assert colour(tab, one, varying, of_variation) == "amber"
+        assert colour(tab, one, varying, of_variation) == "yellow"
         assert colour(tab, one, distorting, of_distortion) == "pink"
         assert colour(tab, one, varying, 1.2 * whole[varying]) == "none"
         tab.page.locator("#legend [data-name=parts]").click()
@@ -179,7 +179,7 @@ def test_each_part_has_its_colour_and_the_switch_shows_the_whole(browser: Browse
             tab.until("bode.curves.measured && bode.parts.size")
             tab.settle()
         tab.page.locator("#legend [data-name=parts]").click()
-        assert colour(tab, one, varying, of_variation) == "amber"
+        assert colour(tab, one, varying, of_variation) == "yellow"
 
 
 def test_a_machine_at_rest_has_no_time_variation(browser: Browser, tmp_path: Path) -> None:

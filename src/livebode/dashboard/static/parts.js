@@ -15,7 +15,7 @@ import { tr } from "./language.js";
 export const PARTS = [
   { words: tr("noise"), ink: "measured", width: 6, reach: ({ noise }) => noise },
   { words: tr("distortion"), ink: "t3", width: 3.6, reach: ({ distorted }) => distorted },
-  { words: tr("time variation"), ink: "t1", width: 1.6, reach: ({ reach }) => reach },
+  { words: tr("time variation"), ink: "t7", width: 1.6, reach: ({ reach }) => reach },
 ];
 const SEEN = 0.995, // of the reach: what adds less is not seen
   SAME = 1 - 1e-6; // two numbers that travelled as float32

@@ -41,7 +41,7 @@ function filled(bode) {
     `${nameOf(name)}: ${tr("magnitude")}`,
     `${nameOf(name)}: ${tr("phase")}`,
     `${nameOf(name)}: ${tr("coherence")}`,
-    ...partsOf(bode, name).map((part) => `${nameOf(name)}: ${tr("{part}, %", { part: PARTS[part].words })}`),
+    ...partsOf(bode, name).map((part) => `${nameOf(name)}: ${PARTS[part].words}, %`),
   ]);
   return [
     element(

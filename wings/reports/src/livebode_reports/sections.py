@@ -162,8 +162,8 @@ def stabilisation(of: ReportData) -> Section | str | None:
     if not path.is_file():
         return None
     caption = tr(
-        "Poles of models of increasing order over frequency, as drawn when the modes were fitted. A pole that stays from "
-        "order to order belongs to a mode of the machine."
+        "Poles of models of increasing order over frequency, as drawn when the modes were fitted. A pole that stays "
+        "from order to order belongs to a mode of the machine."
     )
     svg = stored_svg(path, caption)
     if svg is None:
