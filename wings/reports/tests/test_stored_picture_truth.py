@@ -75,4 +75,4 @@ def test_what_livebode_has_not_drawn_is_not_in_the_report(run: Path, name: str) 
     assert TITLE not in titles(run)
     page = to_html(run_report(run, made=MADE, appendix=True))
     assert "evil" not in page
-    assert "No stabilisation chart: livebode has not drawn the file of this run." in page
+    assert "No stabilisation chart: the file in the run&#x27;s directory was changed." in page

@@ -168,8 +168,8 @@ def stabilisation(of: ReportData) -> Section | str | None:
     svg = stored_svg(path, caption)
     if svg is None:
         return tr(
-            "No stabilisation chart: livebode has not drawn the file of this run. Use `livebode fit RUN --model modal` "
-            "to draw it."
+            "No stabilisation chart: the file in the run's directory was changed. Use `livebode fit RUN --model modal` "
+            "to draw it again."
         )
     return Section(tr("Stabilisation chart"), (Picture(STORED, {"svg": svg}, caption),))
 
