@@ -37,8 +37,6 @@ function atLines(curve, at) {
     db: pick(curve.db),
     deg: pick(curve.deg),
     reach: pick(curve.reach),
-    noise: pick(curve.noise),
-    distorted: pick(curve.distorted),
     coherence: pick(curve.coherence),
   };
 }

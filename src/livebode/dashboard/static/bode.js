@@ -326,8 +326,7 @@ export class Bode {
     else this.shown.delete(name);
     for (const made of this.charts)
       for (const [i, { label, show: now }] of made.series.entries())
-        if (i && String(label).replace(/( distorted| noise)? (high|low)$/, "") === name && now !== show)
-          made.setSeries(i, { show });
+        if (i && String(label).replace(/ (high|low)$/, "") === name && now !== show) made.setSeries(i, { show });
     this.draw();
   }
 

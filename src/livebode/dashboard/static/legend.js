@@ -6,7 +6,7 @@ import { tr } from "./language.js";
 import { partSwatch, swatch } from "./looks.js";
 import { element } from "./make.js";
 import { nameOf, resultOf } from "./names.js";
-import { PARTS } from "./parts.js";
+import { shown } from "./parts.js";
 
 /** @import { Bode } from "./bode.js" */
 /** @import { Curves, Facts } from "./messages.js" */
@@ -60,15 +60,13 @@ function partsOf(bode) {
     view.choose("bound", view.inParts ? "whole" : "parts");
     bode.rebuild();
   };
-  const title = tr("What the 95 % bound of the measured curve consists of"),
-    pressed = String(view.inParts);
   return [
     element(
       "button",
-      { type: "button", "aria-pressed": pressed, "data-name": "parts", title, onclick },
+      { type: "button", "aria-pressed": String(view.inParts), "data-name": "parts", onclick },
       tr("parts of the bound"),
     ),
-    ...PARTS.filter((_, part) => view.inParts && (part === 0 || parts.has(part))).map(({ ink, words }) =>
+    ...(view.inParts ? shown(parts) : []).map(({ ink, words }) =>
       element("span", { class: "key" }, partSwatch(ink), words),
     ),
   ];

@@ -62,10 +62,10 @@ function seriesOf(bode, name, index) {
     },
   ];
   if (index === 2 || name === "model") return series;
-  const inner = bode.banded(name) ? [" distorted", " noise"] : [];
-  for (const edge of ["", ...inner].flatMap((part) => [`${part} high`, `${part} low`]))
+  // Of the whole, and where it has parts, of noise and distortion and of the noise.
+  for (const edge of ["high", "low", "high", "low", "high", "low"].slice(0, bode.banded(name) ? 6 : 2))
     series.push({
-      label: `${name}${edge}`,
+      label: `${name} ${edge}`,
       show,
       stroke: () => "transparent",
       width: 0,

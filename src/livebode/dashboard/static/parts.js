@@ -11,6 +11,8 @@ import { tr } from "./language.js";
  * @property {(curve: Curve) => Numbers} reach of this part and those before it
  */
 
+/** @typedef {Part & {i: number}} Shown */
+
 /** @type {Part[]} */
 export const PARTS = [
   { words: tr("noise"), ink: "measured", width: 6, reach: ({ noise }) => noise },
@@ -25,6 +27,9 @@ const adds = (curve, part, i) => PARTS[part - 1].reach(curve)[i] < SEEN * PARTS[
 
 /** The parts besides noise that a curve has. @param {Curve} curve */
 export const others = (curve) => [1, 2].filter((part) => curve.hz.some((_, i) => adds(curve, part, i)));
+
+/** The parts that a legend, a table and the read-out have. @param {Set<number>} known those besides noise */
+export const shown = (known) => PARTS.map((part, i) => ({ ...part, i })).filter(({ i }) => i === 0 || known.has(i));
 
 /** What is drawn at a line, from the outside: each part with its reach. @param {Curve} curve @param {number} i */
 export const drawnAt = (curve, i) =>

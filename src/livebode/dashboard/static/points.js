@@ -12,8 +12,7 @@ import { colour } from "./theme.js";
 /** @import { Curves } from "./messages.js" */
 
 const RADIUS = 3.6,
-  CAP = 3.5,
-  THIN = 1.3;
+  CAP = 3.5;
 
 /** @type {Record<Marker, (ctx: CanvasRenderingContext2D, x: number, y: number, r: number) => void>} */
 export const MARKERS = {
@@ -108,7 +107,7 @@ export function drawPoints(u, name, curve, values, what, parted) {
     stroke(width, [[x, top, x, bottom]]);
     if (cap)
       stroke(
-        Math.min(width, THIN),
+        1,
         [top, bottom].map((y) => [x - cap, y, x + cap, y]),
       );
   };
@@ -123,7 +122,7 @@ export function drawPoints(u, name, curve, values, what, parted) {
           ctx.strokeStyle = colour(shade);
           bar(x, ends(phase, value, reach), width, outer === 0 ? CAP * px : 0);
         }
-      else bar(x, ends(phase, value, curve.reach[i]), own ? THIN : 1, CAP * px);
+      else bar(x, ends(phase, value, curve.reach[i]), own ? 1.3 : 1, CAP * px);
       ctx.strokeStyle = ink(name);
     }
     ctx.lineWidth = 1.6 * px;

@@ -6,7 +6,7 @@ import { halfDeg, highDb, lowDb } from "./frames.js";
 import { tr } from "./language.js";
 import { element } from "./make.js";
 import { nameOf } from "./names.js";
-import { PARTS } from "./parts.js";
+import { shown } from "./parts.js";
 import { angle, bounds, frequency, halfAngle, level } from "./values.js";
 import { fixed, plain, signed } from "./words.js";
 
@@ -107,9 +107,7 @@ function between(bode) {
 /** The parts of the bound that are drawn. @param {Bode} bode @param {Found} found */
 function partsOf({ parted, parts, symbol }, { measured }) {
   if (!parted || !measured || !Number.isFinite(measured.reach)) return [];
-  const each = PARTS.flatMap(({ words }, part) =>
-    part && !parts.has(part) ? [] : `${words} ${plain(100 * measured.parts[part], 2)} %`,
-  );
+  const each = shown(parts).map(({ words, i }) => `${words} ${plain(100 * measured.parts[i], 2)} %`);
   const words = tr("parts of the 95 % bound, of |{symbol}|: {parts}", { symbol, parts: each.join(", ") });
   return [element("p", { class: "parts" }, words)];
 }

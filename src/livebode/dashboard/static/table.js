@@ -5,7 +5,7 @@ import { halfDeg, highDb, lowDb } from "./frames.js";
 import { tr } from "./language.js";
 import { byId as $, element } from "./make.js";
 import { nameOf } from "./names.js";
-import { PARTS } from "./parts.js";
+import { shown } from "./parts.js";
 import { angle, bounds, frequency, halfAngle, level } from "./values.js";
 import { fixed, plain } from "./words.js";
 
@@ -13,13 +13,12 @@ import { fixed, plain } from "./words.js";
 /** @import { AtCursor, Curves } from "./messages.js" */
 
 /** The parts of a bound that are shown of a curve. @param {Bode} bode @param {Curves} name */
-const partsOf = ({ parted, parts }, name) =>
-  parted && name === "measured" ? [...PARTS.keys()].filter((part) => part === 0 || parts.has(part)) : [];
+const partsOf = ({ parted, parts }, name) => (parted && name === "measured" ? shown(parts) : []);
 
 /**
  * @param {AtCursor | undefined} value
  * @param {import("./view.js").View} view
- * @param {number[]} parts
+ * @param {import("./parts.js").Shown[]} parts
  */
 function cells(value, view, parts) {
   if (!value) return ["", "", "", ...parts.map(() => "")];
@@ -29,7 +28,7 @@ function cells(value, view, parts) {
     known ? `${level(db, view)} (${bounds(lowDb(db, reach), db, highDb(db, reach), view)})` : level(db, view),
     Number.isFinite(reach) ? `${angle(deg)} ${halfAngle(halfDeg(reach))}` : angle(deg),
     Number.isFinite(coherence) ? fixed(coherence, 3) : "",
-    ...parts.map((part) => (Number.isFinite(reach) ? plain(100 * value.parts[part], 2) : "")),
+    ...parts.map(({ i }) => (Number.isFinite(reach) ? plain(100 * value.parts[i], 2) : "")),
   ];
 }
 
@@ -41,7 +40,7 @@ function filled(bode) {
     `${nameOf(name)}: ${tr("magnitude")}`,
     `${nameOf(name)}: ${tr("phase")}`,
     `${nameOf(name)}: ${tr("coherence")}`,
-    ...partsOf(bode, name).map((part) => `${nameOf(name)}: ${PARTS[part].words}, %`),
+    ...partsOf(bode, name).map(({ words }) => `${nameOf(name)}: ${words}, %`),
   ]);
   return [
     element(
