@@ -21,7 +21,16 @@ from livebode.excitation import MatrixExcitation, multisine
 from livebode.monitoring import Baseline, Monitor
 from livebode.runtime import ChangeDetection, Destination, Feed, Fits, RunLoop, SingleResponse
 from livebode.runtime._demo import RATE_HZ, demo_axis, described_loop
-from livebode.simulation import BeltAxis, GantryLoop, Sensor, SimulatedAxis, Standstill, TwoMassLoop
+from livebode.simulation import (
+    BeltAxis,
+    Friction,
+    GantryLoop,
+    Sensor,
+    SimulatedAxis,
+    Standstill,
+    TensionLoss,
+    TwoMassLoop,
+)
 
 Afterwards = Literal["live", "silent", "over"]
 BLOCK = 400
@@ -164,6 +173,22 @@ def at_standstill(lines: Lines, amplitude_n_m: float) -> tuple[Held, Settings]:
     )
     settings = Settings(lines=lines, output="velocity", input="u", excitation="w", schedule="x", hop=lines.window // 4)
     return Held(SimulatedAxis(axis), 6.0, "over"), settings
+
+
+def drifting() -> tuple[Held, Settings]:
+    """Twelve seconds of a belt with friction that loses 10 % of its stiffness, and how it is averaged."""
+    excited = tuple(k for k in range(15, 125, 2) if k % 8 != 3)  # odd bins; every fourth is a detection line
+    lines = Lines(excited, 3200, RATE_HZ, tuple(set(range(15, 125)) - set(excited)))
+    axis = BeltAxis(
+        motion=Standstill(position_m=0.8),
+        friction=Friction(motor_coulomb_n_m=0.02),
+        excitation_n_m=multisine(lines),
+        sensor=Sensor(noise_rad_per_s=1.0),
+        faults=(TensionLoss(loss=0.1, ramp_s=12.0),),
+        seconds=12.0,
+    )
+    settings = Settings(lines=lines, output="velocity", input="u", excitation="w", hop=800, average=True)
+    return Held(SimulatedAxis(axis), 12.0, "over"), settings
 
 
 def write_loop(folder: Path) -> Path:

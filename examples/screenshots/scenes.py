@@ -120,6 +120,20 @@ def lines_1(studio: Studio) -> bytes:
 
 
 @scene
+def bound_parts(studio: Studio) -> bytes:
+    page = studio.page(studio.views([studio.drifting]), color_scheme="light")
+    page.locator("#legend [data-name=model]").click()
+    page.mouse.move(5, 300)
+    page.wait_for_timeout(500)
+    return page.locator(".card.bode").screenshot()
+
+
+@scene
+def bound_parts_phone(studio: Studio) -> bytes:
+    return picture(studio.page(studio.views([studio.drifting]), size=PHONE, color_scheme="dark", **MOBILE))
+
+
+@scene
 def silent(studio: Studio) -> bytes:
     with studio.live({"axis-x": "silent"}) as dashboard:
         page = studio.page(dashboard.url)

@@ -15,7 +15,15 @@ from typing import Any
 
 from playwright.sync_api import Browser, Page, sync_playwright
 
-from examples.screenshots.machines import Afterwards, Tracked, at_standstill, healthy, write_gantry, write_loop
+from examples.screenshots.machines import (
+    Afterwards,
+    Tracked,
+    at_standstill,
+    drifting,
+    healthy,
+    write_gantry,
+    write_loop,
+)
 from livebode.core import Lines
 from livebode.dashboard import Dashboard, ServerSettings
 from livebode.interface import write_examples
@@ -91,6 +99,13 @@ class Studio(ExitStack):
         held, settings = at_standstill(lines, amplitude_n_m)
         with Tracked(held, settings, self.folder / name):
             return self.folder / name
+
+    @cached_property
+    def drifting(self) -> Path:
+        """A finished run of a belt that becomes softer while it is averaged."""
+        held, settings = drifting()
+        with Tracked(held, settings, self.folder / "drifting belt"):
+            return self.folder / "drifting belt"
 
     @cached_property
     def start_url(self) -> str:

@@ -37,13 +37,14 @@ def decoded(data: bytes) -> list[dict[str, object]]:
     found, at = [], 0
     while at < len(data):
         magic, version, kind, quantity, axis, rows, columns = struct.unpack_from("<4sBBBBII", data, at)
-        assert (magic, version) == (b"LBCV", 2)
+        assert (magic, version) == (b"LBCV", 3)
         next_at = at + 16
         one: dict[str, object] = {"kind": KINDS[kind], "quantity": QUANTITIES[quantity], "axis": axis}
         for name in ("time_s", "schedule", "dof"):
             one[name] = np.frombuffer(data, "<f8", rows, next_at)
             next_at += 8 * rows
-        for name in ("magnitude", "phase", "reach", "noise", "coherence"):
+        names = ["magnitude", "phase"] + ["reach", "coherence"] * (KINDS[kind] != "model")
+        for name in names + ["noise", "distorted"] * (KINDS[kind] in ("newest", "moment")):
             one[name] = np.frombuffer(data, "<f4", rows * columns, next_at).reshape(rows, columns)
             next_at += 4 * rows * columns
         found.append(one)
@@ -61,14 +62,21 @@ def test_frames_hold_the_responses(responses: Responses) -> None:
     with np.errstate(invalid="ignore"):
         others = np.nan_to_num(responses.distortion) ** 2 + np.nan_to_num(responses.variation) ** 2
         alone = np.sqrt(np.maximum(responses.sigma**2 - others, 0.0))
+        steady = np.sqrt(alone**2 + np.nan_to_num(responses.distortion) ** 2)
+        parts = {
+            name: np.where(use, widened(part, responses.dof[:, np.newaxis], CIRCLE_FACTOR) / size, np.nan)
+            for name, part in (("noise", alone), ("distorted", steady))
+        }
         expected = {
             "magnitude": np.where(use, responses.magnitude_db, np.nan),
             "reach": np.where(use, responses.bound() / size, np.nan),
-            "noise": np.where(use, widened(alone, responses.dof[:, np.newaxis], CIRCLE_FACTOR) / size, np.nan),
             "coherence": np.where(use, responses.coherence, np.nan),
         }
     for name, values in expected.items():
         assert np.allclose(first[name], values, rtol=1e-6, atol=1e-5, equal_nan=True), name
+    for name, values in parts.items():  # of one response only: the others would have half as many bytes again
+        assert name not in first
+        assert np.allclose(second[name], values[-1:], rtol=1e-6, atol=1e-5, equal_nan=True), name
     turned = np.exp(1j * np.radians(np.asarray(first["phase"], dtype=float)))
     assert np.allclose(turned[use], responses.value[use] / np.abs(responses.value[use]), atol=1e-4)
     assert np.array_equal(first["time_s"], responses.time_s)

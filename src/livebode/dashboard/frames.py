@@ -3,14 +3,16 @@
 | byte | type | what |
 |---|---|---|
 | 0 | 4 bytes | `LBCV` |
-| 4 | u8 | version, 2 |
+| 4 | u8 | version, 3 |
 | 5 | u8 | kind, an index into `KINDS` |
 | 6 | u8 | quantity, an index into plant, open loop, closed loop, sensitivity |
 | 7 | u8 | axis |
 | 8 | u32 | rows |
 | 12 | u32 | columns: lines, or points of the model's grid |
 | 16 | f64 × rows, each | time in s, schedule, dof |
-| then | f32 × rows × columns, each | magnitude in dB, phase in degrees, reach, reach of the noise alone, coherence |
+| then | f32 × rows × columns, each | magnitude in dB, phase in degrees |
+| of responses | the same | reach, coherence |
+| of newest, moment | the same | reach of the noise alone, reach of noise and distortion |
 | end | | zeros up to a multiple of 8 bytes, where the next frame may begin |
 
 Of the kind `fits` there is only JSON after the head, as many bytes as there are rows: one row of every parameter, those
@@ -18,17 +20,19 @@ of the fit whose model follows in the same message.
 
 Numbers are little endian, in row order. `reach` is bound/|value|, with the radius of 95 %: the edges of the band are
 magnitude + 20·log10(1 ± reach) and phase ± arcsin(reach), undefined for reach ≥ 1. The reach of the noise alone leaves
-out what repeats with the excitation (friction, backlash, encoder steps), and is unknown where that is unknown. Unknown
-values are NaN.
+out distortion, which repeats with the excitation (friction, backlash, encoder steps), and time variation; the reach of
+noise and distortion leaves out time variation. A part that is not known counts as zero. Unknown values are NaN.
 """
 
 from __future__ import annotations
 
 import struct
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
+from livebode.arrays import Floats
 from livebode.core import CIRCLE_FACTOR, Quantity, Responses, widened
 from livebode.dashboard.quantities import QUANTITIES
 from livebode.pictures import unwrapped
@@ -40,7 +44,8 @@ KINDS = (
     *(f"reference {slot}" for slot in range(2, REFERENCES_MAX + 1)),
 )
 _HEADER = struct.Struct("<4sBBBBII")
-_MAGIC, _VERSION = b"LBCV", 2
+_MAGIC, _VERSION = b"LBCV", 3
+_WITH_PARTS = "newest", "moment"  # of others the page shows no parts of the bound
 _WHOLE_PHASE_ROWS = 8  # up to this many rows the phase is unwrapped over frequency
 
 
@@ -57,14 +62,26 @@ def frame(kind: str, axis: int, responses: Responses) -> bytes:
         size = np.where(use, np.abs(responses.value), np.nan)
         magnitude = 20 * np.log10(size)
         reach = responses.bound() / size
-        noise = widened(responses.noise, responses.dof[:, np.newaxis], CIRCLE_FACTOR) / size
         phase = np.where(use, np.degrees(np.angle(responses.value)), np.nan)
     if rows <= _WHOLE_PHASE_ROWS:
         phase = np.array([unwrapped(p, np.nan_to_num(r) >= 1) for p, r in zip(phase, reach)]).reshape(rows, columns)
     head = header(kind, axis, responses.quantity, rows, columns)
     times = (responses.time_s, responses.schedule, responses.dof)
-    curves = (magnitude, phase, reach, noise, np.where(use, responses.coherence, np.nan))
+    curves = [magnitude, phase, reach, np.where(use, responses.coherence, np.nan)]
+    if kind in _WITH_PARTS:
+        curves += [_widened(part, responses) / size for part in _inner_parts(responses)]
     return _packed(head, times, curves)
+
+
+def _inner_parts(responses: Responses) -> tuple[Floats, Floats]:
+    """Sigma of the noise, and of noise and distortion, (rows, lines)."""
+    distortion = np.where(np.isfinite(responses.distortion), responses.distortion, 0.0)
+    return responses.noise, np.hypot(responses.noise, distortion)
+
+
+def _widened(sigma: Floats, responses: Responses) -> Floats:
+    """The radius of 95 % of a part of sigma, (rows, lines)."""
+    return widened(sigma, responses.dof[:, np.newaxis], CIRCLE_FACTOR)
 
 
 def curve(kind: str, axis: int, quantity: Quantity, time_s: float, value: np.ndarray[Any, Any]) -> bytes:
@@ -72,10 +89,9 @@ def curve(kind: str, axis: int, quantity: Quantity, time_s: float, value: np.nda
     with np.errstate(divide="ignore", invalid="ignore"):
         magnitude = 20 * np.log10(np.abs(value))
     phase = unwrapped(np.degrees(np.angle(value)), np.zeros(len(value), dtype=bool))
-    nothing = np.full(len(value), np.nan)
     unknown = np.array([np.nan])
     head = header(kind, axis, quantity, 1, len(value))
-    return _packed(head, (np.array([time_s]), unknown, unknown), (magnitude, phase, nothing, nothing, nothing))
+    return _packed(head, (np.array([time_s]), unknown, unknown), (magnitude, phase))
 
 
 def fits(axis: int, quantity: Quantity, plain: list[dict[str, Any]]) -> bytes:
@@ -90,7 +106,7 @@ def header(kind: str, axis: int, quantity: Quantity, rows: int, columns: int) ->
     return _HEADER.pack(_MAGIC, _VERSION, KINDS.index(kind), QUANTITIES.index(quantity), axis, rows, columns)
 
 
-def _packed(head: bytes, times: tuple[Any, ...], curves: tuple[Any, ...]) -> bytes:
+def _packed(head: bytes, times: Sequence[Floats], curves: Sequence[Floats]) -> bytes:
     parts = [head, *(np.asarray(x, "<f8").tobytes() for x in times), *(np.asarray(x, "<f4").tobytes() for x in curves)]
     data = b"".join(parts)
     return data + bytes(-len(data) % 8)

@@ -54,7 +54,7 @@ def stabilisation_figure(poles: CommonPoles, *, title: str = "") -> Figure:
     marks: list[Mark] = [
         Trace("magnitude", f, _over(decibels(poles.magnitude), y.low, y.high), LIGHT.muted, 1.0),
         *(Trace("mode", np.full(2, at_hz), np.array([y.low, y.high]), LIGHT.newest, 0.9, "dashed") for at_hz in modes),
-        Dots("other", hz[inside & ~stable], order[inside & ~stable], LIGHT.muted, 3.5, "plus", 0.7),
+        Dots("other", hz[inside & ~stable], order[inside & ~stable], LIGHT.muted, 6.0, "plus", 0.7),
         Dots("stable", hz[inside & stable], order[inside & stable], LIGHT.run, 4.0),
     ]
     key = (

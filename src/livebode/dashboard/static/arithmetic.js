@@ -37,7 +37,6 @@ function atLines(curve, at) {
     db: pick(curve.db),
     deg: pick(curve.deg),
     reach: pick(curve.reach),
-    noise: pick(curve.noise),
     coherence: pick(curve.coherence),
   };
 }
@@ -58,8 +57,9 @@ export function computed({ kind, a: nameA, b: nameB }, curves, lines, at) {
   if (!curves[nameA] || !curves[nameB]) return null;
   const [a, b] = [atLines(curves[nameA], at), atLines(curves[nameB], at)];
   const { db, deg, reach } = kind === "ratio" ? ratio(a, b) : difference(a, b);
-  const coherence = lines.map(() => NaN);
-  return { frame: null, hz: lines, index: at, db, deg: unwrapped(deg, reach), reach, noise: coherence, coherence };
+  const unknown = lines.map(() => NaN),
+    parts = { noise: unknown, distorted: unknown };
+  return { frame: null, hz: lines, index: at, db, deg: unwrapped(deg, reach), reach, ...parts, coherence: unknown };
 }
 
 /**

@@ -9,6 +9,7 @@ import { next } from "./extrema.js";
 import { marked } from "./marks.js";
 import { mostlyNoise, NoiseHold } from "./noise-hold.js";
 import { panel } from "./panel.js";
+import { aloneAt, others } from "./parts.js";
 import { Tooltip } from "./tooltip.js";
 import { View } from "./view.js";
 import { scaled, shifted, Zoom } from "./zoom.js";
@@ -54,6 +55,10 @@ export class Bode {
     this.hold = new NoiseHold();
     this.tooltip = new Tooltip();
     this.shown = new Set(NAMES);
+    /** Indices of the parts besides noise that the bounds of this run have had. @type {Set<number>} */
+    this.parts = new Set();
+    /** Whether the charts have the parts of the bound. */
+    this.parted = false;
     /** In the displayed quantity, at their own frequencies. @type {Partial<Record<Curves, Curve>>} */
     this.curves = {};
     /** The same over the grid, in the view. @type {Partial<Record<Curves, Drawn>>} */
@@ -151,6 +156,7 @@ export class Bode {
     this.charts = [];
     this.curves = {};
     this.drawn = {};
+    this.parts.clear();
     this.extremum = null;
   }
 
@@ -162,11 +168,22 @@ export class Bode {
     return NAMES.filter((name) => name !== "result" && (!optional(name) || this.curves[name]));
   }
 
+  /** Whether the bound of the measured curve is to be drawn in parts. */
+  get partedNow() {
+    return this.view.inParts && this.parts.size > 0;
+  }
+
+  /** Whether this curve has a band in parts. @param {Curves} name */
+  banded(name) {
+    return this.parted && name === "measured" && !this.few;
+  }
+
   // Charts for the curves and the options of the view; data follow with `draw`.
   build() {
     for (const made of this.charts) made.destroy();
     this.tooltip.hide();
     this.laid = this.layout();
+    this.parted = this.partedNow;
     this.hold = new NoiseHold();
     this.ranges = [steady({ step: 5, least: 10 }), steady({ step: 15, least: 30 })];
     this.charts = [];
@@ -197,6 +214,9 @@ export class Bode {
         by = value === "deg" && curve ? curve.turns : 0;
       for (const key of name === "model" ? [value] : [value, ...edges])
         found.push(curve ? moved(curve[key], by) : this.nothing);
+      if (this.banded(name) && edges.length)
+        for (const part of curve ? curve.inner() : [null, null])
+          for (const edge of edges) found.push(part ? moved(part[edge], by) : this.nothing);
     }
     return found;
   }
@@ -277,7 +297,10 @@ export class Bode {
     const { measured: known } = this.curves,
       other = known && !this.operation ? this.derived?.curve(known) : null;
     if (other) this.curves["what if"] = other;
-    if (this.layout().join() !== this.laid.join()) this.build();
+    const before = this.parts.size;
+    if (known) for (const part of others(known)) this.parts.add(part);
+    if (this.layout().join() !== this.laid.join() || this.partedNow !== this.parted) this.build();
+    else if (this.parts.size > before) this.known.laid();
     const ratio = this.operation?.kind === "ratio";
     for (const name of this.laid) {
       const curve = this.curves[name];
@@ -442,7 +465,7 @@ export class Bode {
         db: drawn.db[at] ?? NaN,
         deg: (drawn.deg[at] ?? NaN) + drawn.turns,
         reach: curve.reach[i],
-        noise: curve.noise[i],
+        parts: aloneAt(curve, i),
         coherence: curve.coherence[i],
         frame: curve.frame,
       };

@@ -9,7 +9,8 @@ import { halfDeg, highDb, lowDb, REFERENCES } from "./frames.js";
 
 /**
  * A curve at its own frequencies, in the displayed quantity, before any option of the view is applied. `reach` is
- * bound/|value| (95 %), `noise` the same of the noise alone, `index` the place of each frequency in the grid.
+ * bound/|value| (95 %), `noise` and `distorted` that of parts of the bound (parts.js), `index` the place of each frequency
+ * in the grid.
  *
  * @typedef {object} Curve
  * @property {Frame | null} frame null where it is computed from others
@@ -19,6 +20,7 @@ import { halfDeg, highDb, lowDb, REFERENCES } from "./frames.js";
  * @property {Numbers} deg without jumps of whole turns
  * @property {Numbers} reach
  * @property {Numbers} noise
+ * @property {Numbers} distorted
  * @property {Numbers} coherence
  */
 
@@ -44,6 +46,7 @@ export function curveOf(frame, lines, grid, at) {
     deg: frame.phase,
     reach: frame.reach,
     noise: frame.noise,
+    distorted: frame.distorted,
     coherence: frame.coherence,
   };
 }
@@ -87,13 +90,19 @@ export function overGrid(curve, { db, deg }, points) {
     }
     return found;
   };
+  /** @param {Numbers} of */
+  const edges = (of) => ({
+    dbHigh: spread((i) => highDb(db[i], of[i])),
+    dbLow: spread((i) => lowDb(db[i], of[i])),
+    degHigh: spread((i) => deg[i] + halfDeg(of[i])),
+    degLow: spread((i) => deg[i] - halfDeg(of[i])),
+  });
   return {
     db: spread((i) => db[i]),
-    dbHigh: spread((i) => highDb(db[i], reach[i])),
-    dbLow: spread((i) => lowDb(db[i], reach[i])),
     deg: spread((i) => deg[i]),
-    degHigh: spread((i) => deg[i] + halfDeg(reach[i])),
-    degLow: spread((i) => deg[i] - halfDeg(reach[i])),
+    ...edges(reach),
+    /** Edges of the inner parts of the bound, from the outside. */
+    inner: () => [edges(curve.distorted), edges(curve.noise)],
     // Values that differ from zero; other values of an overlaid curve must not set the scale.
     dbSure: spread((i) => (reach[i] >= 1 ? NaN : db[i])),
     degSure: spread((i) => (reach[i] >= 1 ? NaN : deg[i])),

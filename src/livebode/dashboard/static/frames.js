@@ -31,7 +31,7 @@ export function* framesOf(buffer) {
   const view = new DataView(buffer);
   let at = 0;
   while (at + 16 <= buffer.byteLength) {
-    if (view.getUint32(at) !== 0x4c424356 || view.getUint8(at + 4) !== 2)
+    if (view.getUint32(at) !== 0x4c424356 || view.getUint8(at + 4) !== 3)
       throw new Error("this is not a frame of curves");
     const rows = view.getUint32(at + 8, true),
       columns = view.getUint32(at + 12, true),
@@ -50,11 +50,14 @@ export function* framesOf(buffer) {
       next += 8 * rows;
       return a;
     };
-    const floats = () => {
+    const floats = (sent = true) => {
+      if (!sent) return new Float32Array(cells).fill(NaN);
       const a = new Float32Array(buffer, next, cells);
       next += 4 * cells;
       return a;
     };
+    const bounded = kind !== "model",
+      parts = kind === "newest" || kind === "moment";
     yield {
       kind,
       quantity,
@@ -66,9 +69,10 @@ export function* framesOf(buffer) {
       dof: doubles(),
       magnitude: floats(),
       phase: floats(),
-      reach: floats(),
-      noise: floats(),
-      coherence: floats(),
+      reach: floats(bounded),
+      coherence: floats(bounded),
+      noise: floats(parts),
+      distorted: floats(parts),
     };
     at = (next + 7) & ~7;
   }

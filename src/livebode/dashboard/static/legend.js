@@ -1,10 +1,12 @@
 // @ts-check
-// The legend of the Bode plot; its buttons hide curves.
+// The legend of the Bode plot; its buttons hide curves, and show the bound in parts or as a whole.
 
 import { LISTED } from "./curves.js";
-import { swatch } from "./looks.js";
+import { tr } from "./language.js";
+import { partSwatch, swatch } from "./looks.js";
 import { element } from "./make.js";
 import { nameOf, resultOf } from "./names.js";
+import { shown } from "./parts.js";
 
 /** @import { Bode } from "./bode.js" */
 /** @import { Curves, Facts } from "./messages.js" */
@@ -44,7 +46,28 @@ export function legend(host, bode, facts, references) {
         name === "result" && bode.operation ? resultOf(bode.operation) : nameOf(name),
       ),
     ),
+    ...(bode.operation ? [] : partsOf(bode)),
   );
   const previous = focused && host.querySelector(`[data-name="${focused}"]`);
   if (previous instanceof HTMLElement) previous.focus();
+}
+
+/** The switch for the parts of the bound, and what each is; nothing where no part besides noise is known. @param {Bode} bode */
+function partsOf(bode) {
+  const { view, parts } = bode;
+  if (!parts.size) return [];
+  const onclick = () => {
+    view.choose("bound", view.inParts ? "whole" : "parts");
+    bode.rebuild();
+  };
+  return [
+    element(
+      "button",
+      { type: "button", "aria-pressed": String(view.inParts), "data-name": "parts", onclick },
+      tr("parts of the bound"),
+    ),
+    ...(view.inParts ? shown(parts) : []).map(({ ink, words }) =>
+      element("span", { class: "key" }, partSwatch(ink), words),
+    ),
+  ];
 }

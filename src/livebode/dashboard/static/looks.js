@@ -48,18 +48,33 @@ const PATHS = {
  * @param {boolean} points
  */
 export function swatch(name, points) {
-  const ns = "http://www.w3.org/2000/svg",
-    { ink: variable, dash, marker } = LOOKS[name];
-  const svg = document.createElementNS(ns, "svg"),
-    path = document.createElementNS(ns, "path"),
+  const { ink: variable, dash, marker } = LOOKS[name],
     line = !points || name === "model";
+  if (line) return sign(variable, "M0 6h26", 2.4, false, dash.join(" "));
+  return sign(variable, PATHS[marker], 1.8, marker === "circle");
+}
+
+/** A part of a bound as a small picture for a legend. @param {string} variable its colour in look.css */
+export const partSwatch = (variable) => sign(variable, "M4 3h18v6h-18z", 1, true);
+
+/**
+ * @param {string} variable a colour in look.css
+ * @param {string} d
+ * @param {number} width
+ * @param {boolean} filled
+ * @param {string} [dash]
+ */
+function sign(variable, d, width, filled, dash) {
+  const ns = "http://www.w3.org/2000/svg";
+  const svg = document.createElementNS(ns, "svg"),
+    path = document.createElementNS(ns, "path");
   for (const [key, value] of Object.entries({ width: 26, height: 12, "aria-hidden": "true", class: "swatch-line" }))
     svg.setAttribute(key, String(value));
-  path.setAttribute("d", line ? "M0 6h26" : PATHS[marker]);
-  path.setAttribute("stroke-width", line ? "2.4" : "1.8");
-  if (line) path.setAttribute("stroke-dasharray", dash.join(" "));
+  path.setAttribute("d", d);
+  path.setAttribute("stroke-width", String(width));
+  if (dash) path.setAttribute("stroke-dasharray", dash);
   path.style.stroke = `var(--${variable})`;
-  path.style.fill = !line && marker === "circle" ? `var(--${variable})` : "none";
+  path.style.fill = filled ? `var(--${variable})` : "none";
   svg.append(path);
   return svg;
 }

@@ -27,9 +27,11 @@ export interface Frame {
   magnitude: Float32Array;
   phase: Float32Array;
   reach: Float32Array;
-  /** `reach` of the noise alone. */
-  noise: Float32Array;
   coherence: Float32Array;
+  /** `reach` of the noise alone; this and the next only of the newest response and of a moment, else NaN. */
+  noise: Float32Array;
+  /** `reach` of noise and distortion; time variation is the rest. */
+  distorted: Float32Array;
 }
 
 /** The fits that are shown together: one row of every parameter, of the fit whose model is in the same message. */
@@ -288,7 +290,8 @@ export interface AtCursor {
   db: number;
   deg: number;
   reach: number;
-  noise: number;
+  /** reach of noise, distortion and time variation, each alone */
+  parts: number[];
   coherence: number;
   /** null where the curve is computed from others */
   frame: Frame | null;

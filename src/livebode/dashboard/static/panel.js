@@ -6,7 +6,9 @@ import { gestures } from "./gestures.js";
 import { tr } from "./language.js";
 import { ink, look } from "./looks.js";
 import { drawMarks } from "./marks.js";
+import { PARTS } from "./parts.js";
 import { drawPoints, jumps } from "./points.js";
+import { colour } from "./theme.js";
 import { frequencyAxis, left, magnitudeAxis, phaseAxis } from "./ticks.js";
 import { scaled, shifted } from "./zoom.js";
 
@@ -60,7 +62,8 @@ function seriesOf(bode, name, index) {
     },
   ];
   if (index === 2 || name === "model") return series;
-  for (const edge of ["high", "low"])
+  // Of the whole, and where it has parts, of noise and distortion and of the noise.
+  for (const edge of ["high", "low", "high", "low", "high", "low"].slice(0, bode.banded(name) ? 6 : 2))
     series.push({
       label: `${name} ${edge}`,
       show,
@@ -70,6 +73,24 @@ function seriesOf(bode, name, index) {
       gaps: cut,
     });
   return series;
+}
+
+/**
+ * The parts of a bound side by side, so that no colour is mixed: from the upper edge to the lower one.
+ *
+ * @param {number} first series of the curve; the edges of the whole, of noise and distortion, and of the noise follow it
+ * @returns {uPlot.Band[]}
+ */
+function strips(first) {
+  const shade = (/** @type {number} */ part) => () => `${colour(PARTS[part].ink)}${part ? "a0" : "50"}`;
+  const between = [
+    [1, 3, 2],
+    [3, 5, 1],
+    [5, 6, 0],
+    [6, 4, 1],
+    [4, 2, 2],
+  ];
+  return between.map(([high, low, part]) => ({ series: [first + high, first + low], fill: shade(part) }));
 }
 
 /** The chart with the frequencies; on a wall, and above sliders on a telephone, there is no room for the coherence. @param {Bode} bode */
@@ -89,7 +110,8 @@ export function panel(bode, index) {
     const first = series.length;
     const own = name === "measured" || name === "result";
     series.push(...seriesOf(bode, name, index));
-    if (series.length - first === 3 && !bode.few)
+    if (series.length - first === 7) bands.push(...strips(first));
+    else if (series.length - first === 3 && !bode.few)
       bands.push({ series: [first + 1, first + 2], fill: () => `${ink(name)}${own ? "38" : "24"}` });
   }
   const y = [
@@ -140,7 +162,7 @@ function above(bode, u, index, i) {
   const name = bode.laid.find((known) => known === u.series[i].label),
     curve = name && bode.curves[name];
   if (!curve || !bode.few || name === "model") return;
-  drawPoints(u, name, curve, /** @type {import("./curves.js").Values} */ (u.data[i]), PANELS[index].value);
+  drawPoints(u, name, curve, /** @type {import("./curves.js").Values} */ (u.data[i]), PANELS[index].value, bode.parted);
 }
 
 /**

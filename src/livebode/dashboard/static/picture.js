@@ -24,14 +24,14 @@ let now = false;
 export const drawingPicture = () => now;
 
 /**
- * The entries of a legend whose buttons are pressed.
+ * The entries of a legend: the curves whose buttons are pressed, and keys.
  *
  * @param {HTMLElement} host
  * @returns {Entry[]}
  */
 export function legendOf(host) {
-  return Array.from(host.querySelectorAll("button"))
-    .filter((button) => !button.hidden && button.getAttribute("aria-pressed") === "true")
+  return Array.from(/** @type {NodeListOf<HTMLElement>} */ (host.querySelectorAll("button, .key")))
+    .filter((entry) => !entry.hidden && entry.getAttribute("aria-pressed") !== "false" && entry.firstElementChild)
     .map((button) => {
       const drawn = button.querySelector("svg path"),
         swatch = drawn ?? button.querySelector(".swatch"),

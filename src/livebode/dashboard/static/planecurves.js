@@ -5,6 +5,7 @@ import { letters } from "./chart.js";
 import { nicholsBound } from "./contours.js";
 import { ink, look } from "./looks.js";
 import { label } from "./marks.js";
+import { drawnAt } from "./parts.js";
 import { drawingPicture } from "./picture.js";
 import { across, circle, up } from "./planemarks.js";
 import { MARKERS } from "./points.js";
@@ -40,10 +41,16 @@ function bounds(sheet, { name, curve, x, y, db, deg }) {
   const { ctx, px, u, plane, bode } = sheet,
     faint = bode.few ? 1 : 0.35; // many bounds lie above each other
   ctx.setLineDash([]);
-  ctx.strokeStyle = ctx.fillStyle = ink(name);
   ctx.lineWidth = px;
-  for (const [i, reach] of curve.reach.entries()) {
-    if (!Number.isFinite(reach + x[i] + y[i])) continue;
+  const whole = (/** @type {number} */ i) => [{ ink: look(name).ink, reach: curve.reach[i] }],
+    parted = bode.parted && name === "measured";
+  for (const i of curve.hz.keys()) for (const part of parted ? drawnAt(curve, i) : whole(i)) bound(i, part);
+  ctx.globalAlpha = 1;
+
+  /** @param {number} i @param {{ink: string, reach: number}} part */
+  function bound(i, { ink: shade, reach }) {
+    if (!Number.isFinite(reach + x[i] + y[i])) return;
+    ctx.strokeStyle = ctx.fillStyle = colour(shade);
     if (plane.round) circle(sheet, { re: x[i], im: y[i], radius: reach * 10 ** (db[i] / 20) });
     else {
       ctx.beginPath();
@@ -55,7 +62,6 @@ function bounds(sheet, { name, curve, x, y, db, deg }) {
     ctx.globalAlpha = (isOwn(name) ? 0.6 : 0.4) * faint;
     ctx.stroke();
   }
-  ctx.globalAlpha = 1;
 }
 
 /** @param {Sheet} sheet @param {Traced} traced */

@@ -1,8 +1,10 @@
 // @ts-check
-// Few lines as points with error bars: the thick part of a bar is the noise, the whole of it the noise and what repeats.
+// Few lines as points with error bars, which may show the parts of the bound: the thickest is the noise.
 import { letters } from "./chart.js";
 import { halfDeg, highDb, lowDb } from "./frames.js";
 import { ink, look } from "./looks.js";
+import { drawnAt } from "./parts.js";
+import { colour } from "./theme.js";
 
 /** @import { Chart } from "./chart.js" */
 /** @import { Curve, Values } from "./curves.js" */
@@ -79,8 +81,9 @@ const ends = (phase, value, reach) =>
  * @param {Curve} curve
  * @param {Values} values drawn values over the grid
  * @param {"db" | "deg" | "coherence"} what
+ * @param {boolean} parted whether the bound of the measured curve is drawn in parts
  */
-export function drawPoints(u, name, curve, values, what) {
+export function drawPoints(u, name, curve, values, what, parted) {
   const { ctx, bbox } = u,
     px = devicePixelRatio * letters(),
     own = name === "measured" || name === "result";
@@ -94,16 +97,19 @@ export function drawPoints(u, name, curve, values, what) {
   const bar = (x, [low, high], width, cap) => {
     if (!Number.isFinite(high - low)) return;
     const [top, bottom] = [u.valToPos(high, "y", true), u.valToPos(Math.max(low, -900), "y", true)];
-    ctx.lineWidth = width * px;
-    ctx.beginPath();
-    ctx.moveTo(x, top);
-    ctx.lineTo(x, bottom);
+    /** @param {number} wide @param {number[][]} parts */
+    const stroke = (wide, parts) => {
+      ctx.lineWidth = wide * px;
+      ctx.beginPath();
+      strokes(ctx, parts);
+      ctx.stroke();
+    };
+    stroke(width, [[x, top, x, bottom]]);
     if (cap)
-      strokes(ctx, [
-        [x - cap, top, x + cap, top],
-        [x - cap, bottom, x + cap, bottom],
-      ]);
-    ctx.stroke();
+      stroke(
+        1,
+        [top, bottom].map((y) => [x - cap, y, x + cap, y]),
+      );
   };
   for (const [i, at] of curve.index.entries()) {
     const value = values[at];
@@ -111,8 +117,13 @@ export function drawPoints(u, name, curve, values, what) {
     const x = u.valToPos(curve.hz[i], "x", true);
     if (what !== "coherence") {
       const phase = what === "deg";
-      bar(x, ends(phase, value, curve.reach[i]), own ? 1.3 : 1, CAP * px);
-      if (own && curve.noise[i] < curve.reach[i] * 0.995) bar(x, ends(phase, value, curve.noise[i]), 4, 0);
+      if (parted && name === "measured")
+        for (const [outer, { ink: shade, width, reach }] of drawnAt(curve, i).entries()) {
+          ctx.strokeStyle = colour(shade);
+          bar(x, ends(phase, value, reach), width, outer === 0 ? CAP * px : 0);
+        }
+      else bar(x, ends(phase, value, curve.reach[i]), own ? 1.3 : 1, CAP * px);
+      ctx.strokeStyle = ink(name);
     }
     ctx.lineWidth = 1.6 * px;
     ctx.beginPath();

@@ -6,6 +6,7 @@ import { halfDeg, highDb, lowDb } from "./frames.js";
 import { tr } from "./language.js";
 import { element } from "./make.js";
 import { nameOf } from "./names.js";
+import { shown } from "./parts.js";
 import { angle, bounds, frequency, halfAngle, level } from "./values.js";
 import { fixed, plain, signed } from "./words.js";
 
@@ -103,6 +104,14 @@ function between(bode) {
   return [element("table", { class: "cursors" }, element("caption", {}, head), element("tbody", {}, ...rows))];
 }
 
+/** The parts of the bound that are drawn. @param {Bode} bode @param {Found} found */
+function partsOf({ parted, parts, symbol }, { measured }) {
+  if (!parted || !measured || !Number.isFinite(measured.reach)) return [];
+  const each = shown(parts).map(({ words, i }) => `${words} ${plain(100 * measured.parts[i], 2)} %`);
+  const words = tr("parts of the 95 % bound, of |{symbol}|: {parts}", { symbol, parts: each.join(", ") });
+  return [element("p", { class: "parts" }, words)];
+}
+
 /** The peak or antiresonance that was searched for. @param {Bode} bode */
 function extremum(bode) {
   const found = bode.extremum;
@@ -146,6 +155,7 @@ export function readout(host, hz, found, schedule, bode) {
       element("caption", {}, words),
       element("tbody", {}, ...(rows.length ? rows : [element("tr", {}, element("th", {}, "–"))])),
     ),
+    ...partsOf(bode, found),
     ...extremum(bode),
     ...between(bode),
   );

@@ -5,24 +5,30 @@ import { halfDeg, highDb, lowDb } from "./frames.js";
 import { tr } from "./language.js";
 import { byId as $, element } from "./make.js";
 import { nameOf } from "./names.js";
+import { shown } from "./parts.js";
 import { angle, bounds, frequency, halfAngle, level } from "./values.js";
-import { fixed } from "./words.js";
+import { fixed, plain } from "./words.js";
 
 /** @import { Bode } from "./bode.js" */
 /** @import { AtCursor, Curves } from "./messages.js" */
 
+/** The parts of a bound that are shown of a curve. @param {Bode} bode @param {Curves} name */
+const partsOf = ({ parted, parts }, name) => (parted && name === "measured" ? shown(parts) : []);
+
 /**
  * @param {AtCursor | undefined} value
  * @param {import("./view.js").View} view
+ * @param {import("./parts.js").Shown[]} parts
  */
-function cells(value, view) {
-  if (!value) return ["", "", ""];
+function cells(value, view, parts) {
+  if (!value) return ["", "", "", ...parts.map(() => "")];
   const { db, deg, reach, coherence } = value,
     known = Number.isFinite(reach) && lowDb(db, reach) > -999;
   return [
     known ? `${level(db, view)} (${bounds(lowDb(db, reach), db, highDb(db, reach), view)})` : level(db, view),
     Number.isFinite(reach) ? `${angle(deg)} ${halfAngle(halfDeg(reach))}` : angle(deg),
     Number.isFinite(coherence) ? fixed(coherence, 3) : "",
+    ...parts.map(({ i }) => (Number.isFinite(reach) ? plain(100 * value.parts[i], 2) : "")),
   ];
 }
 
@@ -34,6 +40,7 @@ function filled(bode) {
     `${nameOf(name)}: ${tr("magnitude")}`,
     `${nameOf(name)}: ${tr("phase")}`,
     `${nameOf(name)}: ${tr("coherence")}`,
+    ...partsOf(bode, name).map(({ words }) => `${nameOf(name)}: ${words}, %`),
   ]);
   return [
     element(
@@ -49,7 +56,9 @@ function filled(bode) {
           "tr",
           {},
           element("th", { scope: "row" }, frequency(hz, bode.view)),
-          ...names.flatMap((name) => cells(values[line][name], bode.view)).map((text) => element("td", {}, text)),
+          ...names
+            .flatMap((name) => cells(values[line][name], bode.view, partsOf(bode, name)))
+            .map((text) => element("td", {}, text)),
         ),
       ),
     ),

@@ -15,6 +15,7 @@ export const OPTIONS = /** @type {const} */ ({
   phase: ["unwrapped", "wrapped"],
   power: ["0", "1", "2", "-1", "-2"],
   units: ["si", "drive"],
+  bound: ["parts", "whole"],
 });
 /** @typedef {keyof typeof OPTIONS} Option */
 
@@ -26,7 +27,7 @@ const inAddress = (option) => `bode-${option}`;
 export class View {
   constructor() {
     /** @type {Record<Option, string>} */
-    this.options = { frequency: "log", unit: "hz", magnitude: "db", phase: "unwrapped", power: "0", units: "si" };
+    this.options = /** @type {Record<Option, string>} */ ({});
     for (const option of /** @type {Option[]} */ (Object.keys(OPTIONS)))
       this.options[option] = chosen(inAddress(option), OPTIONS[option][0], OPTIONS[option]);
     const ms = Number(chosen(inAddress("delay"), "0"));
@@ -64,6 +65,10 @@ export class View {
 
   get absolute() {
     return this.options.magnitude === "absolute";
+  }
+
+  get inParts() {
+    return this.options.bound === "parts";
   }
 
   get inDrive() {

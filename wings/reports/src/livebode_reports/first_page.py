@@ -110,7 +110,8 @@ def read_logo(path: Path, text: str) -> Logo:
     if data.startswith(b"\x89PNG\r\n"):
         _check_png(path, data)
         return Logo(data, "png", text)
-    _check_svg(path, data)
+    if why := svg_fault(data):
+        raise _unusable(path, why)
     return Logo(data, "svg", text)
 
 
@@ -130,18 +131,18 @@ def _check_png(path: Path, data: bytes) -> None:
         raise _unusable(path, f"has {size[0]} × {size[1]} pixels, more than {_PIXELS_MAX} on a side")
 
 
-def _check_svg(path: Path, data: bytes) -> None:
+def svg_fault(data: bytes) -> str:
+    """Why a file is not a passive SVG; empty if it is."""
     from xml.etree import ElementTree
 
     if match := _ACTIVE.search(data):
         content = match.group().decode("ascii", "replace")
-        raise _unusable(path, f"contains {content!r}: a logo may not load or execute anything")
+        return f"contains {content!r}: a logo may not load or execute anything"
     try:
         root = ElementTree.fromstring(data)
     except ElementTree.ParseError:
-        raise _unusable(path, "is neither a PNG nor an SVG") from None
-    if root.tag != "{http://www.w3.org/2000/svg}svg":
-        raise _unusable(path, "is neither a PNG nor an SVG")
+        return "is neither a PNG nor an SVG"
+    return "" if root.tag == "{http://www.w3.org/2000/svg}svg" else "is neither a PNG nor an SVG"
 
 
 def _unusable(path: Path, why: str) -> ConfigError:

@@ -21,7 +21,7 @@ from livebode_reports.verdict import verdict
 from livebode_reports.wording import duration
 
 _MEASURED = (
-    how, distortion, sections.tracking, sections.parameters, sections.motion, sections.margins,
+    how, distortion, sections.tracking, sections.parameters, sections.stabilisation, sections.motion, sections.margins,
 )  # fmt: skip
 _RECORDED = sections.events, sections.validation
 _NUMBERS = sections.response, sections.quality

@@ -26,6 +26,8 @@ from livebode.language import Message, listed, number, quantity_name, tr, worded
 from livebode_reports.events import alarms
 from livebode_reports.parameter_track import Track, reasons
 from livebode_reports.report_data import ReportData, RunData, by_schedule
+from livebode_reports.stored_picture import stored_svg
+from livebode_reports.svg import STORED
 from livebode_reports.wording import (
     line_table,
     lines_of,
@@ -152,6 +154,24 @@ def _fitted(fit: Fit, words: str) -> str:
         "{percent:.2g} % of |G|.",
         **values,
     )
+
+
+def stabilisation(of: ReportData) -> Section | str | None:
+    """The stabilisation chart that a fit of modes has drawn in the run's directory; None where none has."""
+    path = of.run.path / "stabilisation.svg"
+    if not path.is_file():
+        return None
+    caption = tr(
+        "Poles of models of increasing order over frequency, as drawn when the modes were fitted. A pole that stays "
+        "from order to order belongs to a mode of the machine."
+    )
+    svg = stored_svg(path, caption)
+    if svg is None:
+        return tr(
+            "No stabilisation chart: the file in the run's directory was changed. Use `livebode fit RUN --model modal` "
+            "to draw it again."
+        )
+    return Section(tr("Stabilisation chart"), (Picture(STORED, {"svg": svg}, caption),))
 
 
 def motion(of: ReportData) -> Section | None:

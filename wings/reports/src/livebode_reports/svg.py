@@ -20,11 +20,16 @@ _FIGURES: Mapping[str, tuple[str, str]] = {
     "places": ("livebode_reports.comparison:places_figure", ""),
 }
 """What draws each kind, and its title."""
+STORED = "stored"
+"""The kind of a picture that is drawn already: `svg` of its data, as from `stored_svg`."""
 
 
 def pictures_svg(document: Document) -> tuple[str, ...]:
     """The pictures of the document, in the language in use, each as an element with its caption for screen readers."""
-    return tuple(svg(drawn(picture), picture.caption) for picture in document.pictures)
+    return tuple(
+        picture.data["svg"] if picture.what == STORED else svg(drawn(picture), picture.caption)
+        for picture in document.pictures
+    )
 
 
 def drawn(picture: Picture) -> Figure:

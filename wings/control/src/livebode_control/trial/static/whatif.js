@@ -60,7 +60,7 @@ export function tried(curve, quantity, factor) {
     reach[i] = (curve.reach[i] * size(v) * slope) / size(value);
   }
   const nothing = curve.hz.map(() => NaN);
-  return { ...curve, frame: null, db, deg, reach, noise: nothing, coherence: nothing };
+  return { ...curve, frame: null, db, deg, reach, noise: nothing, distorted: nothing, coherence: nothing };
 }
 
 /** @typedef {{kind: "gain" | "phase", hz: number, value: number, reach: number}} Margin dB or °, at a crossing */
