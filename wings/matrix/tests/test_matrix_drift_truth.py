@@ -12,19 +12,18 @@ from livebode.core import Block, Lines, MatrixResponses
 from livebode.excitation import MatrixExcitation
 from livebode.fitting import MatrixDriftTest, Repetitions, mean_matrix
 from livebode_matrix import MatrixSettings, MatrixTracker
+from livebode_reports.matrix_report import read_matrix
 from tests.support.gantry_runs import (
     DWELL,
     LINES,
-    NAMES,
-    RATE_HZ,
     SETTLE,
+    SOFTENING,
     gantry_axis,
     gantry_block,
     gantry_log,
     gantry_run,
+    softening_block,
 )
-
-REPETITIONS = 12
 
 
 def plain(values: np.ndarray, noise: float, seed: int, *, memory: int, average: bool) -> MatrixResponses:
@@ -83,21 +82,6 @@ def test_a_mean_of_few_matrices_has_no_known_variation() -> None:
     assert np.allclose(mean.sigma**2, mean.noise_variance)
 
 
-def softening_block() -> Block:
-    """The gantry, whose belts lose stiffness from one repetition to the next, each time in its steady state."""
-    from livebode.simulation import Gantry, GantryLoop
-
-    excitation = MatrixExcitation.orthogonal(LINES, 2, amplitude=0.5, dwell=DWELL, settle=SETTLE)
-    parts = []
-    for stiffness in np.linspace(1, 0.95, REPETITIONS):
-        gantry = Gantry(stiffness_n_per_m=stiffness * Gantry().stiffness_n_per_m)
-        block = GantryLoop(gantry=gantry).simulate(np.tile(excitation.samples, 2))
-        parts.append(np.array([block[name] for name in NAMES])[:, excitation.samples.shape[1] :])
-    data = np.concatenate(parts, axis=1)
-    data[4:] += 0.02 * np.random.default_rng(0).standard_normal((2, data.shape[1]))
-    return Block(data, NAMES, rate_hz=RATE_HZ)
-
-
 @pytest.fixture(scope="module")
 def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return gantry_log(tmp_path_factory.mktemp("gantry") / "gantry.parquet", softening_block())
@@ -105,7 +89,7 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.parametrize("average", [False, True])
 def test_a_run_says_which_entry_drifts_and_its_bounds_contain_it(log: Path, tmp_path: Path, average: bool) -> None:
-    experiments = {"dwell_periods": DWELL, "settle_periods": SETTLE, "memory": REPETITIONS if average else 3}
+    experiments = {"dwell_periods": DWELL, "settle_periods": SETTLE, "memory": SOFTENING if average else 3}
     axis = gantry_axis(log, experiments=experiments, tracking={"average": average, "hop": 800})
     outcome = gantry_run(axis, tmp_path / "run")
     found = livebode.Run(tmp_path / "run")
@@ -121,6 +105,11 @@ def test_a_run_says_which_entry_drifts_and_its_bounds_contain_it(log: Path, tmp_
     assert varied.any() == average
     if average:  # both are of all repetitions
         assert np.allclose(outcome.matrix.sigma, mean.sigma, rtol=0.1)
+        entry = livebode.Run(tmp_path / "run", entry=f"{most['output']}/{most['input']}").average
+        expected = outcome.matrix.entry(most["output"], most["input"])[0]
+        assert np.array_equal(entry.sigma, expected.sigma)
+        assert np.array_equal(entry.variation, expected.variation)
+        assert read_matrix(tmp_path / "run").newest.equals(outcome.matrix)
 
 
 def test_a_run_at_rest_has_no_drift(tmp_path: Path) -> None:

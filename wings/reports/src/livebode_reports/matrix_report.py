@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from livebode.analysis import ModelTest
+from livebode.analysis import ModelTest, newest_average
 from livebode.configuration import ReportSection, recorded_configuration, recorded_report
 from livebode.core import (
     REASONS,
@@ -27,7 +27,6 @@ from livebode.core import (
     with_bound,
 )
 from livebode.dataclass import dataclass
-from livebode.fitting import MatrixDriftTest, Repetitions, matrix_with_drift
 from livebode.language import number, tr, trn, worded
 from livebode.records import RunRecord
 from livebode_reports import first_page, sections
@@ -63,11 +62,8 @@ def read_matrix(directory: Path, header: ReportSection | None = None) -> MatrixR
     """
     run = RunRecord.open(directory, matrix=True)
     newest: MatrixResponses | None = None
-    drift = _drift_test(run)
     count, incomplete, begin_s, end_s = 0, 0, inf, -inf
     for part in run.undamaged(run.matrix_batches()):
-        if drift is not None:
-            drift.add(part)
         valid = part.valid.any(axis=(1, 2))
         count += len(part)
         incomplete += int(np.count_nonzero(~part.valid.all(axis=(1, 2))))
@@ -81,28 +77,14 @@ def read_matrix(directory: Path, header: ReportSection | None = None) -> MatrixR
             "none of the matrices has a valid column at any line",
             "compare [experiments] with the recording: dwell_periods, settle_periods, start",
         )
-    if drift is not None:
-        newest = matrix_with_drift(newest, drift.result())
     return MatrixReportData(
         run=run,
         configuration=recorded_configuration(run.summary),
         extent=Extent(count, incomplete, (begin_s, end_s), int(newest.sample[0])),
         event_summary=EventSummary.of(run.each_event_and_damage()),
         header=recorded_report(run.summary) if header is None else header,
-        newest=newest,
+        newest=newest_average(run, newest),
     )
-
-
-def _drift_test(run: RunRecord) -> MatrixDriftTest | None:
-    """That of a recording whose matrices are averages, for their bounds."""
-    configuration, found = run.summary.get("configuration", {}), run.found
-    if not configuration.get("tracking", {}).get("average") or "drift" not in run.summary:
-        return None
-    number, dwell, memory = (found["experiments"][name] for name in ("number", "dwell_periods", "memory"))
-    span = found["window"] * (dwell if number > 1 else 1)
-    values = len(run.lines), len(found["outputs"]), len(found["inputs"])
-    of = Repetitions.of_experiments(found["window"], span, number, memory)
-    return MatrixDriftTest(values, run.lines.rate_hz, of)
 
 
 _ACROSS, _DOWN = 3, 3  # Bode plots in one picture; more are illegible on a page
