@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Floats
 from livebode.core import MatrixResponses, Stage, StatefulBase
@@ -89,16 +90,14 @@ class MatrixDriftTest(StatefulBase):
     def add(self, part: MatrixResponses) -> None:
         """Process the next matrices."""
         rows = np.flatnonzero(part.valid.any(axis=(1, 2)))
-        if not rows.size:
-            return
-        part = part[rows]
-        self._add_noise(part)
         if self._of.memory > 1:
-            self._add_gained(part)
+            self._add_gained(part, rows)
             return
-        chosen = self._groups.apart(part.first, part.sample)
-        if chosen:
-            self._add(part.time_s[chosen], _values(part)[chosen])
+        chosen = rows[self._groups.apart(part.first[rows], part.sample[rows])]
+        if chosen.size:
+            part = part[chosen]
+            self._add_noise(part)
+            self._add(part.time_s, _values(part))
 
     def _add_noise(self, part: MatrixResponses) -> None:
         known = np.isfinite(part.dof) & (part.dof > 0)
@@ -107,26 +106,27 @@ class MatrixDriftTest(StatefulBase):
             for row in np.where(np.isfinite(values), values, 0):  # one by one: the same for any way of cutting
                 sums += row
 
-    def _add_gained(self, part: MatrixResponses) -> None:
+    def _add_gained(self, part: MatrixResponses, rows: NDArray[np.intp]) -> None:
         """Add the repetition that each average gained, all at one place in the cycle."""
-        of, values = self._of, _values(part)
-        for row in range(len(part)):
-            sample = int(part.sample[row])
-            count = 1 + (sample - int(part.first[row]) + 1 - of.extent) // of.cycle
-            follows = sample == self._newest[0] + of.cycle
-            if count == 1 and (not self._newest[1] or (sample - self._newest[0]) % of.cycle == 0):
-                value = values[row]
-            elif follows and count == self._newest[1] + 1:
-                value = count * values[row] - (count - 1) * self._average
-            elif follows and count == self._newest[1] == of.memory:
-                value = count * (values[row] - self._average) + self._gained[0]
-            else:
+        of = self._of
+        for row, first, sample in zip(rows.tolist(), part.first[rows].tolist(), part.sample[rows].tolist()):
+            before, repetitions = self._newest.tolist()
+            count = 1 + (sample - first + 1 - of.extent) // of.cycle
+            follows = sample == before + of.cycle
+            begins = count == 1 and (not repetitions or (sample - before) % of.cycle == 0)
+            grows, full = follows and count == repetitions + 1, follows and count == repetitions == of.memory
+            if not (begins or grows or full):
                 continue
-            self._newest[:] = sample, count
-            self._average = values[row]
+            now = part[row : row + 1]
+            average = _values(now)[0]
+            value = average
+            if not begins:
+                value = count * average - (repetitions if grows else count) * self._average
+                value = value + self._gained[0] if full else value
+            self._newest[:], self._average = (sample, count), average
             self._gained = np.concatenate([self._gained[1:], value[np.newaxis]])
-            time_s = part.time_s[row] + (count - 1) * of.cycle / 2 / self._rate_hz
-            self._add(np.array([time_s]), value[np.newaxis])
+            self._add_noise(now)
+            self._add(now.time_s + (count - 1) * of.cycle / 2 / self._rate_hz, value[np.newaxis])
 
     def _add(self, time_s: Floats, value: Complex) -> None:
         value = value.reshape(len(value), -1)

@@ -116,3 +116,19 @@ def test_a_run_at_rest_has_no_drift(tmp_path: Path) -> None:
     block = gantry_block(repetitions=7)
     gantry_run(gantry_axis(gantry_log(tmp_path / "rest.parquet", block)), tmp_path / "run")
     assert livebode.Run(tmp_path / "run").summary["drift"] == {"found": False, "lines": []}
+
+
+@pytest.mark.parametrize("average", [False, True])
+def test_several_outputs_of_one_input_are_tested_window_by_window(average: bool) -> None:
+    lines = Lines.parse("50:150:50", rate_hz=1000, window=100)
+    u = np.tile(MatrixExcitation.orthogonal(lines, 1).samples, 40)
+    gain = np.array([[2.0], [1.0]]) * (1 + np.array([[0.0], [0.1]]) * np.arange(u.shape[1]) / u.shape[1])
+    y = gain * u + 0.01 * np.random.default_rng(2).standard_normal((2, u.shape[1]))
+    settings = MatrixSettings(
+        lines=lines, output=["y1", "y2"], input="u1", estimator="direct", hop=50, average=average, memory=40
+    )
+    found = MatrixTracker(settings).process(Block(np.vstack([y, u]), ("y1", "y2", "u1"), rate_hz=1000))
+    drift = drift_test(found).result()
+    assert drift.significant
+    assert drift.lines.reshape(-1, 2).all(axis=0).tolist() == [False, True]
+    np.testing.assert_allclose(np.abs(drift.change.reshape(-1, 2)[:, 1]), 0.1, rtol=0.1)
