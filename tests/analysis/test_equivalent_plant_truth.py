@@ -32,6 +32,7 @@ def _matrix(value: np.ndarray, noise: np.ndarray, spread: np.ndarray) -> MatrixR
         like, lines=LINES, value=value[np.newaxis], noise=np.tile(noise, (1, count, 1, 1)),
         spread=np.tile(spread, (1, count, 1, 1)), dof=np.array([np.inf]), coherence=np.ones((1, count, 2)),
         condition=np.ones((1, count)), reason=np.zeros((1, count, 2), dtype=np.int8),
+        variation=np.full((1, count, 2, 2), np.nan),
     )  # fmt: skip
 
 
@@ -73,7 +74,8 @@ def test_its_sigma_is_the_scatter_of_noisy_matrices() -> None:
     one = _matrix(value, noise, spread)
     many = replace(
         one, **{name: np.repeat(getattr(one, name), TRIALS, axis=0) for name in
-                ("value", "noise", "spread", "coherence", "condition", "reason", "first", "sample", "time_s", "dof")}
+                ("value", "noise", "spread", "coherence", "condition", "reason", "first", "sample", "time_s", "dof",
+                 "variation")}
     )  # fmt: skip
     many = replace(many, value=many.value + drawn[:, np.newaxis])
     scatter = equivalent_plant(many, loop, *names).value.std(axis=0)
@@ -89,3 +91,18 @@ def test_it_is_the_entry_where_no_other_controller_is_active_and_invalid_with_an
     assert not found.valid[0, 3]
     np.testing.assert_allclose(found.value[0, :3], value[:3, 0, 0], rtol=1e-12)
     np.testing.assert_allclose(found.sigma[0, :3], one.sigma[0, :3, 0, 0], rtol=1e-12)
+
+
+def test_a_change_of_all_entries_together_is_within_its_bound() -> None:
+    """To first order; each entry turns by any angle."""
+    rng = np.random.default_rng(1)
+    value = np.moveaxis(_plant()(2j * np.pi * LINES.frequency_hz), -1, 0)
+    one = _matrix(value, 1e-30 * np.eye(2), np.eye(2))
+    one = replace(one, variation=1e-5 * np.abs(one.value) * rng.uniform(size=one.value.shape))
+    loop = MatrixLoop(feedback=[[as_model(CONTROLLERS[0]), None], [None, as_model(CONTROLLERS[1])]])
+    found = equivalent_plant(one, loop, *(names[0] for names in (one.outputs, one.inputs)))
+    np.testing.assert_allclose(found.variation, found.sigma, rtol=1e-9)
+    for _ in range(100):
+        moved = replace(one, value=one.value + one.variation * np.exp(2j * np.pi * rng.uniform(size=one.value.shape)))
+        change = np.abs(equivalent_plant(moved, loop, one.outputs[0], one.inputs[0]).value - found.value)
+        assert np.all(change <= found.variation * 1.01)

@@ -175,3 +175,18 @@ def test_motion_correction_of_an_excitation_that_does_not_repeat_is_refused(tmp_
     done = livebode("run", path, "--out", tmp_path / "run")
     assert done.code == 2
     assert "[motion] needs an excitation that repeats" in done.err
+
+
+def test_a_machine_that_changes_under_noise_is_reported(tmp_path: Path) -> None:
+    """The gain grows by 10 %, which its average contains; the error of one window is some 2 %."""
+    recorded = columns("noise")
+    changing = recorded | {"y": recorded["y"] * (1 + 0.1 * np.arange(SAMPLES) / SAMPLES)}
+    file = write_parquet(tmp_path / "changing.parquet", changing)
+    options = "--estimator", "lpm", "--lines", "20:100:7", "--window", 256, "--average", "--forgetting", 1
+    open_loop = "--input", "u", "--output", "y"
+    done = livebode("run", file, *open_loop, *options, "--json", "--out", tmp_path / "run")
+    assert done.code == 0, done.err
+    drift = json.loads(done.out)["drift"]
+    assert drift["found"]
+    assert drift["components"][0]["kind"] == "trend"
+    assert "the response drifts during the recording" in done.err

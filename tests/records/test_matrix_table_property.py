@@ -45,6 +45,7 @@ def responses(outputs: int, inputs: int, lines: int, seed: int) -> MatrixRespons
         first=np.arange(ROWS) * 10,
         sample=np.arange(ROWS) * 10 + 99,
         time_s=np.arange(ROWS) / 100,
+        variation=np.abs(values(lines, outputs, inputs)),
     )
 
 

@@ -11,7 +11,7 @@ from livebode.configuration import Axis
 from livebode.core import Block, Lines
 from livebode.excitation import MatrixExcitation
 from livebode.runtime import Destination, Outcome, run
-from livebode.simulation import GantryLoop
+from livebode.simulation import Gantry, GantryLoop
 from tests.support.command import write_parquet
 
 RATE_HZ, WINDOW, DWELL, SETTLE = 4000, 800, 6, 4
@@ -31,6 +31,23 @@ def gantry_block(noise: float = 0.02, repetitions: int = 4, seed: int = 0) -> Bl
     block = GantryLoop().simulate(np.tile(excitation.samples, repetitions))
     data = np.array([block[name] for name in NAMES])
     data[4:] += noise * np.random.default_rng(seed).standard_normal((2, data.shape[1]))
+    return Block(data, NAMES, rate_hz=RATE_HZ)
+
+
+SOFTENING = 12
+"""Repetitions of `softening_block`."""
+
+
+def softening_block() -> Block:
+    """The gantry, whose belts lose 5 % of their stiffness from one repetition to the next, each in its steady state."""
+    excitation = MatrixExcitation.orthogonal(LINES, 2, amplitude=0.5, dwell=DWELL, settle=SETTLE)
+    parts = []
+    for share in np.linspace(1, 0.95, SOFTENING):
+        gantry = Gantry(stiffness_n_per_m=share * Gantry().stiffness_n_per_m)
+        block = GantryLoop(gantry=gantry).simulate(np.tile(excitation.samples, 2))
+        parts.append(np.array([block[name] for name in NAMES])[:, excitation.samples.shape[1] :])
+    data = np.concatenate(parts, axis=1)
+    data[4:] += 0.02 * np.random.default_rng(0).standard_normal((2, data.shape[1]))
     return Block(data, NAMES, rate_hz=RATE_HZ)
 
 

@@ -40,6 +40,7 @@ def matrices(
         sample=first + lines.window - 1,
         time_s=(first + lines.window / 2 - 0.5) / lines.rate_hz,
         units=tuple(tuple(f"m/s/{'AV'[i % 2]}" for i in range(inputs)) for _ in range(outputs)) if seed % 2 else (),
+        variation=np.where(rng.random(value.shape) < hole, np.nan, size * rng.random(value.shape)),
     )
 
 

@@ -22,7 +22,7 @@ from livebode.estimation import (
     UnevenTracker,
 )
 from livebode.excitation import MatrixExcitation, multisine
-from livebode.fitting import DriftTest, EvaluationGrid, Fitter, TwoMass
+from livebode.fitting import DriftTest, EvaluationGrid, Fitter, MatrixDriftTest, Repetitions, TwoMass
 from livebode.monitoring import (
     Baseline,
     Monitor,
@@ -51,6 +51,7 @@ from tests.support.fitted import LINES as FITTED
 from tests.support.fitted import TRUTH, noisy
 from tests.support.fleet_runs import batch as numbered_message
 from tests.support.fleet_runs import fleet_axes
+from tests.support.matrices import matrices as random_matrices
 from tests.support.monitored import ideal, recorded
 from tests.support.stateful import Case
 from tests.support.strokes import learned_torque
@@ -287,6 +288,23 @@ def drift() -> Case:
     return Case(lambda: DriftTest(FITTED), [step(part) for part in rows()], [lambda: DriftTest(LINES)])
 
 
+def matrix_drift() -> Case:
+    """Of averages over two repetitions, with a gap after the fourth row; in the last step the repetitions are full."""
+    value = random_matrices(9, LINES, seed=1)
+    count = np.array([1, 2, 2, 2, 1, 2, 2, 2, 2])
+    sample = 100 * np.arange(9) + 500
+    averages = replace(value, sample=sample, first=sample - 60 - 100 * (count - 1) + 1)
+
+    def step(part: MatrixResponses) -> Callable[[Any], object]:
+        return lambda test: (test.add(part), test.result().value.tobytes())
+
+    def new(memory: int) -> MatrixDriftTest:
+        return MatrixDriftTest((len(LINES), 2, 2), LINES.rate_hz, Repetitions(60, 100, memory))
+
+    parts = averages[:3], averages[3:6], averages[6:]
+    return Case(lambda: new(2), [step(part) for part in parts], [lambda: new(3)])
+
+
 def baseline(by_model: bool) -> Baseline:
     """Of an ideal machine, with a table from responses that scatter."""
     lines, rng = MONITORED.lines, np.random.default_rng(9)
@@ -450,7 +468,8 @@ CASES = {
         tracker, direct_tracker, averaging_tracker, successive_trackers,
         matrix_tracker, matrix_columns, matrix_monitor, matrix_detection,
         local_polynomial, welch_average, spectra_tracker,
-        uneven_tracker, motion_correction, fitter, drift, monitor_by_model, monitor_by_tables, change_detection, fits,
-        torque_monitor, run_counts, readiness, sequencer, axis_stream, stream_position,
+        uneven_tracker, motion_correction, fitter, drift, matrix_drift,
+        monitor_by_model, monitor_by_tables, change_detection, fits, torque_monitor,
+        run_counts, readiness, sequencer, axis_stream, stream_position,
     )
 }  # fmt: skip

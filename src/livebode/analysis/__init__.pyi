@@ -31,6 +31,7 @@ from livebode.analysis.learning import learn_from as learn_from
 from livebode.analysis.learning import learnable_axis as learnable_axis
 from livebode.analysis.learning import reads_recordings as reads_recordings
 from livebode.analysis.margin_reading import margins as margins
+from livebode.analysis.matrix_average import newest_average as newest_average
 from livebode.analysis.open_loop import OpenLoop as OpenLoop
 from livebode.analysis.open_loop import stable as stable
 from livebode.analysis.run_trend import ALARMS as ALARMS

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode import fitting
+from livebode.analysis.matrix_average import entry_average
 from livebode.core import PlantKinds, Response, Responses
 from livebode.dataclass import dataclass
 from livebode.estimation import Movement
@@ -124,7 +125,7 @@ def averaged(run: RunRecord) -> RunMean:
         mean.add(part)
         overview.add(part)
         counted.add(part)
-    response, words = mean.response()[0], Message("the mean of {responses} responses", responses=mean.rows)
+    response, words = _response(run, mean)[0], Message("the mean of {responses} responses", responses=mean.rows)
     if isinstance(mean, fitting.RecordingsMean):
         words = Message("{mean} in {recordings} recordings", mean=words, recordings=len(run.found["recordings"]))
     if mean.averages:
@@ -167,7 +168,11 @@ def mean_of(run: RunRecord) -> Responses:
     mean = running_mean(run)
     for part in run.steady_batches():
         mean.add(part)
-    return mean.response()
+    return _response(run, mean)
+
+
+def _response(run: RunRecord, mean: fitting.RunningMean | fitting.RecordingsMean) -> Responses:
+    return entry_average(run, mean.response()) if mean.averages else mean.response()
 
 
 class _RunProperties:

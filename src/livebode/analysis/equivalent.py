@@ -60,10 +60,14 @@ def equivalent_plant(responses: MatrixResponses, loop: MatrixLoop, output: str, 
     value = np.einsum("rkp,rkp->rk", a, plant[..., i])
     noise = np.einsum("rko,rkop,rkp->rk", a, responses.noise, np.conj(a)).real
     spread = np.einsum("rki,rkij,rkj->rk", b, responses.spread, np.conj(b)).real
+    # All entries may vary together.
+    variation = np.einsum("rko,rkoi,rki->rk", np.abs(a), responses.variation, np.abs(b))
+    variance = np.maximum(noise * spread, 0) + np.nan_to_num(variation) ** 2
     return replace(
         entry,
         value=np.where(valid, value, np.nan),
-        sigma=np.where(valid, np.sqrt(np.maximum(noise * spread, 0)), np.nan),
+        sigma=np.where(valid, np.sqrt(variance), np.nan),
+        variation=variation,
         coherence=responses.coherence.min(axis=2),
         valid=valid,
     )

@@ -96,6 +96,7 @@ _MATRIX_VARIABLES = {
     "sigma": ("sigma", _ENTRY, "standard deviation, E|estimate - truth|^2 = sigma^2"),
     "noise": ("noise", (*_ENTRY[:3], "other_output"), "covariance of the noise in the outputs of one window"),
     "spread": ("spread", (*_ENTRY[:2], "input", "other_input"), "covariance of the columns for noise of unit power"),
+    "variation": ("variation", _ENTRY, "standard deviation by a change of the machine, part of sigma"),
     "coherence": ("coherence", _ENTRY[:3], "multiple coherence of the output with all inputs"),
     "condition": ("condition", _ENTRY[:2], "condition number of the inputs over the experiments"),
     "valid": ("valid", (*_ENTRY[:2], "input"), "whether the column is valid at this line"),

@@ -65,6 +65,9 @@ class MatrixResponses(RowArrays):
         Effective time: mean of the centres of the windows, shape (rows,).
     units
         Unit of each entry, a row for each output; empty where not known.
+    variation
+        Standard deviation of each entry by a change of the machine, shape of `value`; part of `sigma`, and NaN where it
+        is not known.
 
     Examples
     --------
@@ -90,8 +93,14 @@ class MatrixResponses(RowArrays):
     sample: NDArray[np.int64]
     time_s: Floats
     units: tuple[tuple[str, ...], ...] = ()
+    variation: Floats = None  # type: ignore[assignment]
 
     _SHARED = ("lines", "outputs", "inputs", "units")
+
+    def __post_init__(self) -> None:
+        given: object = self.variation
+        if given is None:
+            object.__setattr__(self, "variation", np.full(self.value.shape, np.nan))
 
     @property
     def frequency_hz(self) -> Floats:
@@ -105,15 +114,23 @@ class MatrixResponses(RowArrays):
 
     @property
     def covariance(self) -> Complex:
-        """E δ(o, i)·conj(δ(p, j)) of the errors of entries, shape (rows, lines, outputs, inputs, outputs, inputs)."""
+        """E δ(o, i)·conj(δ(p, j)) of the errors of entries by noise, without `variation`.
+
+        The shape is (rows, lines, outputs, inputs, outputs, inputs).
+        """
         return np.asarray(np.einsum("rkop,rkij->rkoipj", self.noise, self.spread))
 
     @property
     def sigma(self) -> Floats:
-        """Standard deviation of each entry, E|value − truth|² = sigma², shape of `value`."""
+        """Standard deviation of each entry by noise and variation, E|value − truth|² = sigma², shape of `value`."""
+        return np.asarray(np.sqrt(self.noise_variance + np.nan_to_num(self.variation) ** 2))
+
+    @property
+    def noise_variance(self) -> Floats:
+        """Part of the noise in sigma², shape of `value`."""
         noise = np.einsum("rkoo->rko", self.noise).real
         spread = np.einsum("rkii->rki", self.spread).real
-        return np.asarray(np.sqrt(noise[..., :, np.newaxis] * spread[..., np.newaxis, :]))
+        return np.asarray(noise[..., :, np.newaxis] * spread[..., np.newaxis, :])
 
     @property
     def singular_values(self) -> Floats:
@@ -135,15 +152,17 @@ class MatrixResponses(RowArrays):
         (Stewart and Sun, Matrix Perturbation Theory, 1990, section IV.4). The radius is that of the complex number
         u*·δ·v, whose variance is u*·noise·u times vᵀ·spread·v̄. Its modulus is at least its real part, so the radius
         covers the true singular value with a probability of 1 − exp(−c²) or more, 95 % by default, also where it is
-        zero. Biased where several differ by less than their radii: they repel each other, and of three the outer ones
-        are covered less often. docs/explanation/mimo.md has the measured shares.
+        zero. All entries may vary together, so `variation` counts with its largest effect, |u|ᵀ·variation·|v|. Biased
+        where several differ by less than their radii: they repel each other, and of three the outer ones are covered
+        less often. docs/explanation/mimo.md has the measured shares.
         """
         radius = np.full(self.singular_values.shape, np.nan)
         whole = self.valid.all(axis=2)
         left, _, right = np.linalg.svd(self.value[whole], full_matrices=False)
         noise = np.einsum("nok,nop,npk->nk", left.conj(), self.noise[whole], left).real
         spread = np.einsum("nki,nij,nkj->nk", right.conj(), self.spread[whole], right).real
-        radius[whole] = np.sqrt(np.maximum(noise * spread, 0.0))
+        varied = np.einsum("nok,noi,nki->nk", np.abs(left), np.nan_to_num(self.variation[whole]), np.abs(right))
+        radius[whole] = np.sqrt(np.maximum(noise * spread, 0.0) + varied**2)
         return widened(radius, self.dof[:, np.newaxis, np.newaxis], c)
 
     def bound(self, c: float = CIRCLE_FACTOR) -> Floats:
@@ -173,6 +192,7 @@ class MatrixResponses(RowArrays):
             time_s=self.time_s,
             schedule=np.full(len(self), np.nan),
             unit=self.units[o][i] if self.units else "",
+            variation=self.variation[:, :, o, i],
         )
 
     def sel(
@@ -226,6 +246,7 @@ class MatrixResponses(RowArrays):
             condition=rows.condition[:, k],
             reason=rows.reason[:, k][..., i],
             units=tuple(tuple(self.units[m][n] for n in i) for m in o) if self.units else (),
+            variation=rows.variation[:, k][:, :, o][..., i],
         )
 
     def newest(self) -> MatrixResponses:
@@ -262,7 +283,7 @@ class MatrixResponses(RowArrays):
 
         On a CoreXY printer, for example, both motors move both axes. The multiple coherence and the
         units are not known afterwards. A
-        column is valid where all columns were.
+        column is valid where all columns were. Entries may vary together: `variation` is the largest possible.
 
         Parameters
         ----------
@@ -312,6 +333,7 @@ class MatrixResponses(RowArrays):
             self.first,
             self.sample,
             self.time_s,
+            variation=np.abs(a) @ self.variation @ np.abs(b),
         )
 
     def plot(
@@ -360,8 +382,8 @@ class MatrixResponses(RowArrays):
 
         Dimensions ``time_s``, ``frequency_hz``, ``output`` and ``input``; ``first`` and ``sample`` are coordinates
         along time. Variables ``response`` (complex) and ``sigma`` over all four, ``noise`` and ``spread`` with a
-        further dimension ``other_output`` and ``other_input``: their product is the covariance of all entries. Also
-        ``coherence``, ``condition``, ``valid``, ``reason`` and ``dof``.
+        further dimension ``other_output`` and ``other_input``: their product is the covariance of all entries by noise.
+        Also ``variation``, ``coherence``, ``condition``, ``valid``, ``reason`` and ``dof``.
 
         Raises
         ------

@@ -22,13 +22,13 @@ def write_matrix_mat(
 
     Fields: ``H`` (outputs, inputs, lines, responses) complex and ``w`` (lines, 1) in rad/s, for `frd(H, w)`;
     ``CovarianceData`` (outputs, inputs, lines, 2, 2, responses) as `idfrd` takes it: for each entry the covariance of
-    real and imaginary part, sigma²/2 on the diagonal because the error is circular; ``sigma`` in the shape of H;
-    ``noise`` (outputs, outputs, lines, responses) and ``spread`` (inputs, inputs, lines, responses), whose Kronecker
-    product is the covariance of all entries; ``coherence`` (outputs, lines, responses), ``condition`` (lines,
-    responses), ``valid`` and ``reason`` (inputs, lines, responses) with ``reasons`` as their words; ``OutputName``,
-    ``InputName``, ``units`` (outputs, inputs); ``f_hz`` (lines, 1), ``time_s``, ``dof``, ``first``, ``sample``
-    (1, responses), ``Ts`` in seconds, ``window``, and ``run``, run.json as text. A single response has only lines
-    with a valid column; invalid columns are NaN.
+    real and imaginary part, sigma²/2 on the diagonal because the error is circular; ``sigma`` and
+    its part ``variation`` in the shape of H; ``noise`` (outputs, outputs, lines, responses) and ``spread`` (inputs,
+    inputs, lines, responses), whose Kronecker product is the covariance of all entries by noise; ``coherence``
+    (outputs, lines, responses), ``condition`` (lines, responses), ``valid`` and ``reason`` (inputs, lines, responses)
+    with ``reasons`` as their words; ``OutputName``, ``InputName``, ``units`` (outputs, inputs); ``f_hz``
+    (lines, 1), ``time_s``, ``dof``, ``first``, ``sample`` (1, responses), ``Ts`` in seconds, ``window``, and ``run``,
+    run.json as text. A single response has only lines with a valid column; invalid columns are NaN.
 
     Raises
     ------
@@ -51,7 +51,7 @@ def _struct(responses: MatrixResponses) -> dict[str, Any]:
     frequency_hz = responses.frequency_hz[kept]
     over_lines = {
         name: _lines_and_rows_last(getattr(responses, name)[:, kept])
-        for name in ("sigma", "noise", "spread", "coherence", "condition", "valid", "reason")
+        for name in ("sigma", "variation", "noise", "spread", "coherence", "condition", "valid", "reason")
     }
     over_time = {name: getattr(responses, name)[np.newaxis] for name in ("time_s", "dof")}
     # MATLAB counts in doubles; with int64, every sum would become int64.

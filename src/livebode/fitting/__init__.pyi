@@ -17,8 +17,11 @@ from livebode.fitting.drift import Drift as Drift
 from livebode.fitting.drift import DriftTest as DriftTest
 from livebode.fitting.fitter import Fitter as Fitter
 from livebode.fitting.least_squares import minimise as minimise
+from livebode.fitting.matrix_drift import MatrixDriftTest as MatrixDriftTest
+from livebode.fitting.matrix_drift import Repetitions as Repetitions
+from livebode.fitting.matrix_drift import matrix_with_drift as matrix_with_drift
+from livebode.fitting.matrix_mean import mean_matrix as mean_matrix
 from livebode.fitting.mean import RunningMean as RunningMean
-from livebode.fitting.mean import mean_matrix as mean_matrix
 from livebode.fitting.mean import mean_response as mean_response
 from livebode.fitting.mean import with_drift as with_drift
 from livebode.fitting.mean_of_recordings import RecordingScatter as RecordingScatter

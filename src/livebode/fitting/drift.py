@@ -2,17 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Flags, Floats
-from livebode.core import Lines, Response, Responses, Stage, StatefulBase, added, has_moved, with_extremes
+from livebode.core import Lines, Response, Responses, Stage, StatefulBase, has_moved, with_extremes
 from livebode.dataclass import dataclass
-from livebode.fitting.time_course import FALSE_ALARM, GROUPS_MIN, Component, Course, GroupSeries, components_of
+from livebode.fitting.time_course import (
+    FALSE_ALARM,
+    GROUPS_MIN,
+    Component,
+    Course,
+    GroupSeries,
+    components_of,
+    log_chances,
+)
+from livebode.fitting.window_groups import WindowGroups
 
-_VALUES_MAX, _GROUPS = 1 << 16, (64, 512)  # when all groups are full, neighbours are added: memory does not grow
 _MOMENTS = 128  # of the record at which the course is evaluated
 _WITHIN = 1 - np.exp(-1), 1 - np.exp(-4)  # probability of noise within sigma, and within two
 
@@ -41,6 +50,8 @@ class Drift:
         response; of a change that is not significant that of a straight line.
     mean_sigma, begin_sigma, end_sigma
         Standard deviations of the mean and of both ends by noise.
+    remembered
+        Share of the record, at its end, that the mean with this change remembers.
     noise_share
         Share of the noise in the variance of the windows about their mean.
     rms
@@ -63,12 +74,13 @@ class Drift:
     mean_sigma: Floats
     begin_sigma: Floats
     end_sigma: Floats
+    remembered: float
     noise_share: Floats
     rms: Floats
     away: Complex
 
     @classmethod
-    def unknown(cls, value: Complex) -> Drift:
+    def unknown(cls, value: Complex, remembered: float = 1.0) -> Drift:
         """Nothing but the mean is known yet."""
         n = len(value)
         nothing, zeros = np.full(n, complex(np.nan, np.nan)), np.zeros(n)
@@ -87,13 +99,14 @@ class Drift:
             mean_sigma=np.full(n, np.nan),
             begin_sigma=np.full(n, np.nan),
             end_sigma=np.full(n, np.nan),
+            remembered=remembered,
             noise_share=np.ones(n),
             rms=zeros,
             away=np.zeros((_MOMENTS, n), dtype=np.complex128),
         )
 
-    def add(self, series: GroupSeries, remembered: float) -> None:
-        """Fit the components, or a straight line, at the lines of a series; of averages, as long as they remember."""
+    def add(self, series: GroupSeries) -> None:
+        """Fit the components, or a straight line, at the lines of a series."""
         at = series.at
         course = Course.of(series, self.components or [Component("trend", 1)])
         first, last = _extent(series.share)
@@ -111,7 +124,7 @@ class Drift:
             return
         self.begin[at], self.end[at] = value[0], value[1]
         self.begin_sigma[at], self.end_sigma[at] = np.sqrt(course.variance(functions[:2])[:, np.newaxis] * course.noise)
-        share = last - remembered * (last - share[2:])
+        share = last - self.remembered * (last - share[2:])
         functions, value = course.functions(share), course.value(share)
         # The error of the fit is not a change of the machine.
         power = np.mean(np.abs(value - value.mean(axis=0)) ** 2, axis=0)
@@ -122,6 +135,15 @@ class Drift:
         self.away[:, at] = (value - value.mean(axis=0)) * certain
         self.rms[at] = np.sqrt(real)
         self.noise_share[at] = np.minimum(course.noise / course.scatter, 1.0)
+
+    def noise(self, measured: Floats) -> Floats:
+        """The noise of a mean whose `measured` standard deviation contains the change: that about its course, (lines,).
+
+        It is unchanged without a significant change.
+        """
+        if not self.significant:
+            return measured
+        return np.asarray(np.fmin(measured, self.mean_sigma / np.sqrt(self.remembered)))
 
     def variation(self, noise: Floats) -> Floats:
         """What the change adds to the standard deviation `noise` of a mean, so that both cover together, (lines,).
@@ -194,30 +216,13 @@ class DriftTest(StatefulBase):
     taken for a change.
     """
 
-    _stage = Stage("drift-test", 2)
-    _STATE = (
-        "_windows",
-        "_free",
-        "_level",
-        "_schedule",
-        "_times_s",
-        "_pairs",
-        "_begin",
-        "_average",
-        "_value",
-        "_weight",
-        "_share",
-    )
+    _stage = Stage("drift-test", 3)
+    _STATE = ("_groups", "_schedule", "_begin", "_average", "_value", "_weight", "_share")
 
     def __init__(self, lines: Lines) -> None:
         self._window, self._rate_hz, n = lines.window, lines.rate_hz, len(lines)
-        self._windows, self._free, self._level = 0, 0, 0
+        self._groups = WindowGroups(n)
         self._schedule = np.full(2, np.nan)  # smallest and largest
-        most = int(np.clip(_VALUES_MAX // max(n, 1), *_GROUPS))
-        self._groups = 1 << most.bit_length() - 1
-        self._times_s = np.zeros((1, self._groups, n))  # sums over the valid windows
-        self._pairs = np.zeros((3, self._groups, n), dtype=np.complex128)  # number, sums of numerator and denominator
-
         self._begin = np.full(3, np.nan)  # first and newest sample, and time, of the first window
         self._average = np.full(2, np.nan)  # time and schedule of the newest average
         self._value = np.full(n, complex(np.nan, np.nan))  # of that
@@ -235,21 +240,15 @@ class DriftTest(StatefulBase):
 
     def _add_windows(self, part: Responses, single: NDArray[np.intp]) -> None:
         """Add those of the responses `single`, each of one window, that do not overlap."""
-        first, after = part.first[single], part.sample[single] + 1
-        index, following = int(np.searchsorted(first, self._free)), np.searchsorted(first, after).tolist()
-        places: list[int] = []
-        while index < len(following):
-            places.append(index)
-            index = following[index]
-        if places:
-            self._free = int(after[places[-1]])
-            chosen = single[places]
-            valid, weight = part.valid[chosen], part.weight[chosen]
-            if np.isnan(self._begin[0]) and (some := valid.any(axis=1)).any():
-                self._begin_with(part[int(chosen[np.argmax(some)])])
-            weight = np.where(np.isfinite(weight), weight, 1.0)
-            value = np.where(valid, part.value[chosen], np.nan)
-            self._add(part.time_s[chosen], part.schedule[chosen], value, weight)
+        chosen = single[self._groups.apart(part.first[single], part.sample[single])]
+        if not chosen.size:
+            return
+        valid, weight = part.valid[chosen], part.weight[chosen]
+        if np.isnan(self._begin[0]) and (some := valid.any(axis=1)).any():
+            self._begin_with(part[int(chosen[np.argmax(some)])])
+        weight = np.where(np.isfinite(weight), weight, 1.0)
+        value = np.where(valid, part.value[chosen], np.nan)
+        self._add(part.time_s[chosen], part.schedule[chosen], value, weight)
 
     def _begin_with(self, window: Response) -> None:
         self._begin = np.array([window.first, window.sample, window.time_s])
@@ -275,71 +274,47 @@ class DriftTest(StatefulBase):
             self._add(time_s, schedule, np.array(values), np.tile(self._weight, (len(values), 1)))
 
     def _add(self, time_s: Floats, schedule: Floats, value: Complex, weight: Complex | Floats) -> None:
-        """Add windows; `value` is NaN where it is invalid, shape (windows, lines)."""
         self._schedule = with_extremes(self._schedule, schedule)
-        used = np.isfinite(value)
-        times_s = np.where(used, time_s[:, np.newaxis], 0.0)
-        pairs = np.where(used, np.stack([np.ones_like(value), value * weight, weight + 0j]), 0)
-        done = 0
-        while done < len(value):
-            if self._windows >> self._level == self._groups:
-                self._merge()
-            group = self._windows >> self._level
-            stop = min(done + ((group + 1) << self._level) - self._windows, len(value))
-            self._times_s[:, group] = added(self._times_s[:, group], times_s[np.newaxis, done:stop])
-            self._pairs[:, group] = added(self._pairs[:, group], pairs[:, done:stop])
-            self._windows += stop - done
-            done = stop
-
-    def _merge(self) -> None:
-        for sums in (self._times_s, self._pairs):
-            half = sums[:, ::2] + sums[:, 1::2]
-            sums[:, : self._groups // 2] = half
-            sums[:, self._groups // 2 :] = 0
-        self._level += 1
+        self._groups.add(time_s, value, weight)
 
     def result(self) -> Drift:
         """The test on all responses up to now."""
-        n = self._pairs.shape[2]
-        with np.errstate(invalid="ignore", divide="ignore"):
-            value = self._pairs[1].sum(axis=0) / self._pairs[2].sum(axis=0)
-        moved = has_moved(self._schedule)
-        series, begin_s, length_s = self._series()
-        long_enough = [each for each in series if len(each.share) >= GROUPS_MIN]
-        if moved or not long_enough:
-            return Drift.unknown(value)
-        components, own = components_of(long_enough)
-        remembered = min(1.0, 1 / self._share / max(self._windows, 1)) if self._share < 1 else 1.0
-        found = Drift.unknown(value)
-        own = np.concatenate([own, np.zeros(n - len(own))])
-        lines = (own < np.log(FALSE_ALARM / 2 / n)) & bool(components)
-        found = replace(found, tested=True, significant=bool(components), lines=lines, components=tuple(components))
-        found = replace(found, begin_s=begin_s, length_s=length_s)
-        for each in long_enough:
-            found.add(each, remembered)
-        return found
-
-    def _series(self) -> tuple[list[GroupSeries], float, float]:
-        """The lines by the groups in which they have windows; begin and length of the record."""
-        used = self._pairs[0].real > 0
-        if not used.any():
-            return [], 0.0, 0.0
-        patterns, of = np.unique(used, axis=1, return_inverse=True)
-        with np.errstate(invalid="ignore", divide="ignore"):
-            time_s, value = self._times_s[0] / self._pairs[0].real, self._pairs[1] / self._pairs[2]
-        first_s, last_s, number = np.nanmin(time_s), np.nanmax(time_s), int(used.any(axis=1).sum())
-        # The groups are centred on their windows; the record is one group longer.
-        half_s = float(last_s - first_s) / max(number - 1, 1) / 2
-        begin_s, length_s = float(first_s) - half_s, float(last_s - first_s) + 2 * half_s
-        series = []
-        for number, pattern in enumerate(patterns.T):
-            at = np.flatnonzero(of.ravel() == number)
-            rows = np.flatnonzero(pattern)
-            if rows.size and length_s > 0:
-                share = (time_s[rows, at[0]] - begin_s) / length_s
-                series.append(GroupSeries(at, share, self._pairs[0][rows, at[0]].real, value[np.ix_(rows, at)]))
-        return series, begin_s, length_s
+        if has_moved(self._schedule):
+            return Drift.unknown(self._groups.mean())
+        windows = max(self._groups.windows, 1)
+        return drift_of(self._groups, min(1.0, 1 / self._share / windows) if self._share < 1 else 1.0)
 
     @property
     def _identity(self) -> str:
         return f"{self._window}"
+
+
+def drift_of(
+    groups: WindowGroups, remembered: float, tested: Callable[[GroupSeries], GroupSeries] = lambda series: series
+) -> Drift:
+    """The test on these windows.
+
+    Parameters
+    ----------
+    groups
+        The windows.
+    remembered
+        Share of the record, at its end, that the mean remembers.
+    tested
+        The same values as linear combinations whose noise is independent.
+    """
+    value = groups.mean()
+    series, begin_s, length_s = groups.series()
+    series = [each for each in series if len(each.share) >= GROUPS_MIN]
+    found = Drift.unknown(value, remembered)
+    if not series:
+        return found
+    components = components_of([tested(each) for each in series])
+    lines = np.zeros(len(value), dtype=np.bool_)
+    for each in series if components else ():
+        lines[each.at] = log_chances(each, components) < np.log(FALSE_ALARM / 2 / len(value))
+    found = replace(found, tested=True, significant=bool(components), lines=lines, components=tuple(components))
+    found = replace(found, begin_s=begin_s, length_s=length_s)
+    for each in series:
+        found.add(each)
+    return found

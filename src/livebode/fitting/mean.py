@@ -1,20 +1,16 @@
-"""The mean of many responses, with its bounds from their scatter, and of many matrices."""
+"""The mean of many responses, with its bounds from their scatter."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Floats
-from livebode.core import FitError, Response, Responses, SignalError
+from livebode.core import Response, Responses, SignalError
 from livebode.fitting.drift import Drift, DriftTest
-
-if TYPE_CHECKING:
-    from livebode.core import MatrixResponses
 
 _FIRST_VERDICT = 3  # windows that may be valid before the first verdict: three periods, of which two are complete
 
@@ -260,7 +256,7 @@ def with_drift(average: Responses, drift: Drift) -> Responses:
     if not drift.tested:
         return average
     apart = np.nan_to_num(average.variation) > 0
-    noise = average.noise * np.where(apart, 1.0, np.sqrt(drift.noise_share))
+    noise = np.where(apart | ~average.valid, average.noise, drift.noise(average.noise[0]))
     repeated = np.hypot(noise, np.where(np.isfinite(average.distortion), average.distortion, 0.0))
     variation = np.where(average.valid, drift.variation(repeated[0]), np.nan)
     return replace(average, sigma=np.where(average.valid, np.hypot(repeated, variation), np.nan), variation=variation)
@@ -360,68 +356,3 @@ class _Overlap:
         self.sums += [(used * (1 + 2 * each)).sum(axis=0) for each in shared]
         still = self._stop > self._stop[-1] - self._window
         self._stop, self._used = self._stop[still], self._used[still]
-
-
-def mean_matrix(responses: MatrixResponses) -> MatrixResponses:
-    """The mean of the rows that share no window, from the newest backwards, as one row; it needs at least one row.
-
-    A row that contains all repetitions is retained as it is. Rows of fewer repetitions, as early in a run, have less
-    weight: that of value and time is the reciprocal of the row's `spread`, that of `noise` the row's degrees of
-    freedom. The noise of rows may be from the same windows, so its degrees of freedom are their mean with these
-    weights, or those between the rows if these are more. A column is valid where it is in all rows used.
-
-    Raises
-    ------
-    FitError
-        If there is no row with a valid column and a known noise.
-
-    Examples
-    --------
-    >>> from livebode_matrix import example_matrix_responses
-    >>> mean_matrix(example_matrix_responses())
-    <MatrixResponses: 1 rows, 7 lines, 2 outputs × 2 inputs>
-    """
-    known = responses.valid.any(axis=(1, 2)) & (responses.dof > 0)
-    if not known.any():
-        raise FitError(
-            "too-few-lines",
-            "no matrix has a valid column and a known noise",
-            "repeat the experiments: bounds need two repetitions with average, three without it",
-            lines=0,
-        )
-    rows = _without_overlap(responses, np.flatnonzero(known))
-    return _weighted(responses[rows])
-
-
-def _without_overlap(responses: MatrixResponses, rows: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Numbers of the rows that share no window, chosen from the newest backwards; ascending."""
-    chosen: list[int] = []
-    for row in rows[::-1]:
-        if not chosen or responses.sample[row] < responses.first[chosen[-1]]:
-            chosen.append(int(row))
-    return np.array(chosen[::-1], dtype=np.intp)
-
-
-def _weighted(of: MatrixResponses) -> MatrixResponses:
-    from livebode.core import MatrixResponses  # loaded by a matrix run only
-
-    between = (len(of) - 1.0) * len(of.inputs)
-    with np.errstate(invalid="ignore"):
-        weight = 1.0 / np.einsum("rkii->rk", of.spread).real
-        weight = (weight / weight.sum(axis=0))[:, :, np.newaxis, np.newaxis]
-        return MatrixResponses(
-            of.lines,
-            of.outputs,
-            of.inputs,
-            np.sum(weight * of.value, axis=0, keepdims=True),
-            np.average(of.noise, axis=0, weights=of.dof)[np.newaxis],
-            np.sum(weight**2 * of.spread, axis=0, keepdims=True),
-            np.array([max(float(np.average(of.dof, weights=of.dof)), between)]),
-            np.mean(of.coherence, axis=0, keepdims=True),
-            np.max(of.condition, axis=0, keepdims=True),
-            of.reason.max(axis=0, keepdims=True),
-            of.first[:1],
-            of.sample[-1:],
-            np.array([float(np.average(of.time_s, weights=np.nanmean(weight, axis=(1, 2, 3))))]),
-            of.units,
-        )

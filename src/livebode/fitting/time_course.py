@@ -160,8 +160,8 @@ def _families(share: Floats) -> Iterator[tuple[float, list[Component]]]:
     yield 0.25, [Component("periodic", float(1 / c)) for c in cycles if c <= len(share) / 2]
 
 
-def components_of(series: Sequence[GroupSeries]) -> tuple[list[Component], Floats]:
-    """The components that noise does not explain, the clearest first, and ln of the chance of each line's share.
+def components_of(series: Sequence[GroupSeries]) -> list[Component]:
+    """The components that noise does not explain, the clearest first.
 
     Each step tries all families on what the components before leave. A candidate explains power at each line, of which
     the ratio to what remains is F without a change. Its probabilities are combined over the lines by Fisher's method,
@@ -173,22 +173,25 @@ def components_of(series: Sequence[GroupSeries]) -> tuple[list[Component], Float
     lines = sum(len(each.at) for each in left)
     chosen: list[Component] = []
     if not left:
-        return chosen, np.zeros(0)
+        return chosen
     longest = max(left, key=lambda each: len(each.share)).share
-    begun = np.concatenate([each.power() for each in left])
     while len(chosen) < _COMPONENTS_MAX and (best := _best(left, longest, lines, first=not chosen)):
         chosen.append(best)
         for each in left:
             each.remove(best)
-    own = np.zeros(1 + max(int(each.at.max()) for each in series))
-    if not chosen:
-        return chosen, own
-    functions = sum(len(c.functions(longest)) for c in chosen)
-    for each, first in zip(left, np.cumsum([0] + [len(each.at) for each in left])):
-        power, before = each.power(), begun[first : first + len(each.at)]
-        # More functions than three are tested as three, which is too careful by little.
-        own[each.at] = _log_chance(np.maximum(before - power, 0.0), power, min(functions, 3), max(each.free, 1))
-    return chosen, own
+    return chosen
+
+
+def log_chances(series: GroupSeries, components: Sequence[Component]) -> Floats:
+    """ln of the probability by noise of what the components explain at each line, (lines,)."""
+    left = _Remainder(series)
+    before = left.power()
+    for component in components:
+        left.remove(component)
+    functions = sum(len(component.functions(series.share)) for component in components)
+    power = left.power()
+    # More functions than three are tested as three, which is too careful by little.
+    return _log_chance(np.maximum(before - power, 0.0), power, min(functions, 3), max(left.free, 1))
 
 
 def _best(left: Sequence[_Remainder], longest: Floats, lines: int, *, first: bool) -> Component | None:

@@ -48,6 +48,7 @@ from livebode.pictures.words import lines_phrase
 _DASHES = ("", "dashed", "dotted", "mixed")
 _ENTRY_WIDTH, _MAGNITUDE, _PHASE = 190.0, 120.0, 80.0
 _BETWEEN = 10.0
+_Ends = tuple[Floats, Floats]
 
 
 def save_matrix_pictures(responses: MatrixResponses, directory: str | PathLike[str], *, title: str = "") -> list[Path]:
@@ -89,24 +90,38 @@ def matrix_figure(responses: MatrixResponses, *, title: str = "") -> Figure:
             panels += entry.panels(x, scales[o], place=place, top=top, width=one, last=o == down - 1, first=i == 0)
         top += ABOVE + _MAGNITUDE + ABOVE + _PHASE
     key = [Entry(tr("response; bounds of each entry alone: {percent:g} %", percent=100 * COVERAGE), LIGHT.newest)]
+    if any(len(entry.parts) > 1 for row in curves for entry in row):
+        key += [Entry(tr("noise"), LIGHT.newest, "band"), Entry(tr("time variation"), LIGHT.traces[2], "band")]
     if (responses.reason != 0).any():
         key.append(Entry(tr("not valid"), LIGHT.muted, "band"))
     return Figure(title or tr("Bode plots"), _facts(responses), key, panels, top + BELOW, width)
 
 
 class _Entry:
-    """One entry of the newest matrix: its values in dB and degrees, (value, low, high) each."""
+    """One entry of the newest matrix: its values in dB and degrees, (value, low, high) each, and parts of its bound.
+
+    A part is a colour with the ends in dB and in degrees, the whole first; without a time variation there is one.
+    """
 
     def __init__(self, responses: MatrixResponses, output: int, input: int) -> None:
         newest = responses.entry(output, input).newest()
         nothing = np.full(len(responses.frequency_hz), np.nan)
         self.db = self.deg = (nothing, nothing, nothing)
+        self.parts: list[tuple[str, tuple[_Ends, _Ends]]] = []
         if newest is not None:
             use = newest.valid & np.isfinite(newest.value) & (newest.value != 0)
             value, radius = np.where(use, newest.value, np.nan), np.where(use, newest.bound(), np.nan)
             deg = Curve(newest.frequency_hz, value, radius, "", "").phase_deg
-            half = bound_deg(value, radius)
-            self.db, self.deg = (decibels(value), *bound_db(value, radius)), (deg, deg - half, deg + half)
+            radii = [(LIGHT.newest, radius)]
+            if np.any(newest.variation > 0):
+                with np.errstate(invalid="ignore", divide="ignore"):
+                    by_noise = np.where(newest.sigma > 0, radius * newest.noise / newest.sigma, radius)
+                radii = [(LIGHT.traces[2], radius), (LIGHT.newest, by_noise)]
+            for colour, part in radii:
+                half = bound_deg(value, part)
+                self.parts.append((colour, (bound_db(value, part), (deg - half, deg + half))))
+            of_db, of_deg = self.parts[0][1]
+            self.db, self.deg = (decibels(value), *of_db), (deg, *of_deg)
         self._of, self._output, self._input = responses, output, input
         units = responses.units[output] if responses.units else ()
         unit = units[input] if units else ""
@@ -120,8 +135,9 @@ class _Entry:
         invalid = ~of.valid[-1, :, self._input]
         name = f"{of.inputs[self._input]} → {of.outputs[self._output]}"
         shown = []
-        for number, (scale, (value, low, high)) in enumerate(zip(scales, (self.db, self.deg))):
-            marks: list[Mark] = [_shade(of, invalid), *_curve(f, value, low, high, LIGHT.newest)]
+        for number, (scale, (value, _, _)) in enumerate(zip(scales, (self.db, self.deg))):
+            bounds = [(colour, ends[number]) for colour, ends in self.parts]
+            marks: list[Mark] = [_shade(of, invalid), *_curve(f, value, bounds, LIGHT.newest)]
             if invalid.all() and not number:
                 words = sorted({worded(REASONS[n]) for n in of.reason[-1, :, self._input]})
                 marks.append(Note(tr("not valid: {why}", why=", ".join(words))))
@@ -131,12 +147,13 @@ class _Entry:
         return stacked(x if last else unlabelled(x), shown, left=place, width=width, top=top, title=name)[0]
 
 
-def _curve(f: Floats, value: Floats, low: Floats, high: Floats, colour: str, dashes: str = "") -> list[Mark]:
-    """A curve with its bound, with a marker at few lines."""
+def _curve(f: Floats, value: Floats, bounds: Sequence[tuple[str, _Ends]], colour: str, dashes: str = "") -> list[Mark]:
+    """A curve with its bounds, the widest first, with a marker at few lines."""
     line = Trace("value", f, value, colour, 1.2, dashes)
     if len(f) > FEW_LINES:
-        return [Band("bound", f, low, high, colour, 0.28), line]
-    return [Bars("bound", f, low, high, colour), line, Dots("value", f, value, colour, 3.6)]
+        return [*(Band("bound", f, low, high, own, 0.28) for own, (low, high) in bounds), line]
+    bars = [Bars("bound", f, low, high, own) for own, (low, high) in bounds]
+    return [*bars, line, Dots("value", f, value, colour, 3.6)]
 
 
 def _row_scale(curves: list[tuple[Floats, Floats, Floats]], label: str) -> Scale:
@@ -162,7 +179,7 @@ def singular_values_figure(responses: MatrixResponses, *, title: str = "") -> Fi
     ends = []
     for n, (value, low, high) in enumerate(curves):
         colour = LIGHT.traces[n % len(LIGHT.traces)]
-        marks += _curve(f, value, low, high, colour, _DASHES[n % len(_DASHES)])
+        marks += _curve(f, value, [(colour, (low, high))], colour, _DASHES[n % len(_DASHES)])
         if (known := value[np.isfinite(value)]).size:
             ends.append(End(f"σ{n + 1}", float(known[-1]), colour))
     if not ends:

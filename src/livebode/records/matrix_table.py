@@ -188,6 +188,7 @@ def _matrix(table: Table, factors: _Factors, shape: MatrixShape) -> MatrixRespon
         first=first,
         sample=sample,
         time_s=time_s,
+        variation=table["variation"].reshape(whole),
     )
 
 

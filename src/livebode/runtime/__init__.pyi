@@ -16,6 +16,8 @@ from livebode.runtime.documents import RunStarted as RunStarted
 from livebode.runtime.documents import RunStep as RunStep
 from livebode.runtime.documents import Subscriber as Subscriber
 from livebode.runtime.documents import TrackerResults as TrackerResults
+from livebode.runtime.drift import drift_events as drift_events
+from livebode.runtime.drift import of_drift as of_drift
 from livebode.runtime.estimate import SEEN_AGAIN_BYTES as SEEN_AGAIN_BYTES
 from livebode.runtime.estimate import Estimate as Estimate
 from livebode.runtime.estimate import ExaminedRecording as ExaminedRecording

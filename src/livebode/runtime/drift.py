@@ -2,25 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from livebode.core import INTERVAL_FACTOR, Event, Lines, decibels
+from livebode.core import INTERVAL_FACTOR, Event, decibels
 from livebode.fitting import Component, Drift
 from livebode.language import Message
 
 
-def of_drift(drift: Drift, lines: Lines) -> dict[str, Any]:
-    """Entries on a change: its form, and its size at the lines where it is significant, or at the clearest."""
+def of_drift(drift: Drift, places: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Entries on a change: its form, and its size at the lines where it is significant, or at the clearest.
+
+    `places` has of each value of the test its line as `frequency_hz`, and in a matrix its `output` and `input`.
+    """
     if not drift.significant:
         return {"found": False, "lines": []}
     shown = drift.lines.copy()
     if not shown.any():
         shown[np.nanargmax(np.abs(drift.change) / drift.sigma)] = True
     components = [_of_component(component, drift) for component in drift.components]
-    rows = [_of_line(drift, lines, int(i)) for i in np.flatnonzero(shown)]
+    rows = [dict(places[i]) | _of_line(drift, i) for i in np.flatnonzero(shown).tolist()]
     return {"found": True, "components": components, "lines": rows}
 
 
@@ -35,10 +38,9 @@ def _of_component(component: Component, drift: Drift) -> dict[str, Any]:
     return {"kind": component.kind, "degree": int(component.place)}
 
 
-def _of_line(drift: Drift, lines: Lines, i: int) -> dict[str, Any]:
+def _of_line(drift: Drift, i: int) -> dict[str, Any]:
     size = abs(drift.value[i])
     row: dict[str, Any] = {
-        "frequency_hz": float(lines.frequency_hz[i]),
         "percent": 100 * float(abs(drift.change[i]) / size),
         "percent_sigma": 100 * float(drift.sigma[i] / size),
         "rms_percent": 100 * float(drift.rms[i] / size),
@@ -67,6 +69,8 @@ def drift_events(drift: Mapping[str, Any], sample: int, time_s: float) -> list[E
         mean_db=_decibels(most["mean"]),
         end_db=_decibels(most["end"]),
     )
+    if "output" in most:
+        message = Message("{entry}: {change}", entry=f"{most['output']}/{most['input']}", change=message)
     details = {"components": drift["components"], "lines": drift["lines"]}
     return [Event("drift", sample, time_s, message, details)]
 

@@ -66,7 +66,7 @@ def examined_recording(axis: Axis, log: Log, follower: Follower, to: Destination
     log = log.naming(estimate.channels)  # with the covariates of a baseline
     to.announce(RunStep("examining"))
     of, settings = examined(axis, log, follower), follower.settings
-    if settings.quantity == "plant" and settings.periodic:
+    if settings.quantity == "plant" and (settings.periodic or settings.estimator == "lpm"):
         estimate.drift = fitting.DriftTest(settings.lines)
     return ExaminedRecording(axis, of.source, estimate, of.found, log.clock_kind, dated(log), of.noticed)
 

@@ -360,7 +360,7 @@ class SingleResponse(Estimate):
         fitted = {} if self.fits is None else self.fits.entries(self.fit, seen[seen.ready])
         done |= summary.of_source(feed.live) | fitted | self.monitored()
         if self.drift is not None:
-            done["drift"] = of_drift(self.drift.result(), lines)
+            done["drift"] = of_drift(self.drift.result(), [{"frequency_hz": f} for f in lines.frequency_hz.tolist()])
             events += drift_events(done["drift"], sample, time_s)
         if self.recordings is not None:
             done["between"] = of_recordings(self.recordings)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import control
 import numpy as np
 import pytest
@@ -85,3 +87,17 @@ def test_an_invalid_column_leaves_no_singular_value_and_no_bound() -> None:
     assert np.isnan(responses.singular_value_bound()[-1, 2]).all()
     assert np.isfinite(responses.singular_value_bound()[-1, 3]).all()
     assert responses.to_frd().frdata.shape == (2, 2, 6)
+
+
+def test_a_change_of_all_entries_together_is_within_the_bound() -> None:
+    """To first order; each entry turns by any angle."""
+    rng, responses = np.random.default_rng(2), example_matrix_responses()
+    unknown = replace(responses, noise=0 * responses.noise)
+    varied = replace(unknown, variation=1e-5 * np.abs(unknown.value) * rng.uniform(size=unknown.value.shape))
+    bound, before = varied.singular_value_bound(1.0), varied.singular_values
+    assert np.all(unknown.singular_value_bound(1.0) == 0)
+    for _ in range(100):
+        moved = varied.value + varied.variation * np.exp(2j * np.pi * rng.uniform(size=varied.value.shape))
+        assert np.all(np.abs(replace(varied, value=moved).singular_values - before) <= 1.01 * bound)
+    half = varied.transformed([[0.5, 0.5]], np.eye(2), (("y",), ("u1", "u2")))
+    np.testing.assert_allclose(half.variation[:, :, 0], varied.variation.mean(axis=2), rtol=1e-12)

@@ -27,6 +27,7 @@ from livebode.core import (
 )
 from livebode.dataclass import dataclass
 from livebode.estimation import nearest_hop, quarter_hop
+from livebode.fitting import MatrixDriftTest, matrix_with_drift
 from livebode.preparation import LIVE_RESPONSES_PER_S, check_length, chosen_part, is_timed
 from livebode.records import MATRIX_TABLES
 from livebode.runtime import (
@@ -41,6 +42,8 @@ from livebode.runtime import (
     check_channels,
     counts_and_speed,
     dated,
+    drift_events,
+    of_drift,
     of_log,
     of_source,
     versions,
@@ -126,8 +129,11 @@ class ResponseMatrix(Estimate):
         Turns samples into matrices.
     columns
         Counts where the columns are valid, and why not.
+    drift
+        Tests whether the machine drifts within a recording.
     newest, drawn
-        The newest matrix, and the newest with a valid column, of a row each.
+        The newest matrix, and the newest with a valid column, of a row each; at the end of a recording, averages have a
+        drift of the machine in their sigma.
     """
 
     tables: ClassVar = MATRIX_TABLES
@@ -137,6 +143,7 @@ class ResponseMatrix(Estimate):
     columns: MatrixColumns
     detection: MatrixDetection
     readiness: Readiness | None = None
+    drift: MatrixDriftTest | None = None
     newest: MatrixResponses | None = field(default=None, init=False)
     drawn: MatrixResponses | None = field(default=None, init=False)
 
@@ -196,8 +203,9 @@ class ResponseMatrix(Estimate):
 
     @property
     def parts(self) -> Mapping[str, Stateful]:
-        ready = {} if self.readiness is None else {"readiness": self.readiness}
-        return {"tracker": self.tracker, "columns": self.columns, "detection": self.detection, **ready}
+        optional: dict[str, Stateful | None] = {"readiness": self.readiness, "drift": self.drift}
+        parts: dict[str, Stateful] = {"tracker": self.tracker, "columns": self.columns, "detection": self.detection}
+        return parts | {name: part for name, part in optional.items() if part}
 
     def take_over(self, before: Estimate) -> bool:
         try:
@@ -244,6 +252,8 @@ class ResponseMatrix(Estimate):
             self.readiness.left_out(results.sample - self.settings.settled_window + 1, results.sample)
         if len(results):
             self._remember(results)
+            if self.drift is not None:
+                self.drift.add(results)
             yield results
         if (shedding := self.shedding) is not None:
             shedding.monitors()
@@ -279,11 +289,31 @@ class ResponseMatrix(Estimate):
             window=settings.lines.window,
         )
 
-    def summary(self, sample: int, time_s: float) -> tuple[dict[str, Any], list[Event]]:  # noqa: ARG002
+    def summary(self, sample: int, time_s: float) -> tuple[dict[str, Any], list[Event]]:
         feed, lines = self.run.feed, self.settings.lines
         done = self.describe(self.run.about, feed.source.channels) | of_source(feed.live)
         done |= counts_and_speed(self.counts, lines.rate_hz, self.run.counts) | self.monitored()
-        return done | self.columns.summary(lines.frequency_hz), []
+        done |= self.columns.summary(lines.frequency_hz)
+        if self.drift is None:
+            return done, []
+        done["drift"] = self._drift(self.drift)
+        return done, drift_events(done["drift"], sample, time_s)
+
+    def _drift(self, test: MatrixDriftTest) -> dict[str, Any]:
+        """Entries of run.json; the matrices of a run that averages get the change of the machine."""
+        settings = self.settings
+        if settings.average and self.drawn is not None and self.newest is not None:
+            same = self.newest.sample[0] == self.drawn.sample[0]
+            self.drawn = matrix_with_drift(self.drawn, test.result())
+            self.newest = self.drawn if same else self.newest
+        frequency_hz = settings.lines.frequency_hz.tolist()
+        places = [
+            {"frequency_hz": f, "output": output, "input": input}
+            for f in frequency_hz
+            for output in settings.output
+            for input in settings.columns
+        ]
+        return of_drift(test.result(whole=True), places)
 
     def outcome(self, directory: Path, summary: dict[str, Any]) -> Outcome:
         return Outcome(directory, summary, matrix=self.newest)
@@ -295,9 +325,16 @@ def examined_matrix(axis: Axis, logs: Sequence[Log], to: Destination) -> Examine
     log = _part(axis, log)
     hop = None if is_timed(axis) else quarter_hop(matrix_lines(axis, log.rate_hz).window)
     estimate = ResponseMatrix.of(axis, log.rate_hz, hop)
+    estimate.drift = matrix_drift_test(estimate.settings)
     log = log.naming(estimate.channels)
     check_length(log.samples, estimate.window)
     return ExaminedRecording(axis, log, estimate, of_log(log), log.clock_kind, dated(log))
+
+
+def matrix_drift_test(settings: MatrixSettings) -> MatrixDriftTest:
+    """The test for a drift of the machine on matrices with these settings."""
+    values = len(settings.lines), len(settings.output), len(settings.columns)
+    return MatrixDriftTest(values, settings.lines.rate_hz, settings.repetitions)
 
 
 def _part(axis: Axis, log: Log) -> Log:

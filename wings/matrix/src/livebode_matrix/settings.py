@@ -10,6 +10,7 @@ from typing import Literal
 from livebode.core import CHANNELS_MAX, Lines, MatrixLoop, UsageError
 from livebode.dataclass import dataclass
 from livebode.estimation import nearest_hop
+from livebode.fitting import Repetitions
 
 Method = Literal["direct", "joint", "indirect"]
 
@@ -230,6 +231,12 @@ class MatrixSettings:
     def cycle(self) -> int:
         """Samples after which the excitation repeats."""
         return self.span * self.count
+
+    @property
+    def repetitions(self) -> Repetitions:
+        """How a test for a drift of the machine finds the repetitions in the matrices."""
+        memory = self.memory if self.average else 1
+        return Repetitions.of_experiments(self.lines.window, self.span, self.count, memory)
 
     @property
     def settled_window(self) -> int:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from livebode.analysis import ModelTest
+from livebode.analysis import ModelTest, newest_average
 from livebode.configuration import ReportSection, recorded_configuration, recorded_report
 from livebode.core import (
     REASONS,
@@ -83,7 +83,7 @@ def read_matrix(directory: Path, header: ReportSection | None = None) -> MatrixR
         extent=Extent(count, incomplete, (begin_s, end_s), int(newest.sample[0])),
         event_summary=EventSummary.of(run.each_event_and_damage()),
         header=recorded_report(run.summary) if header is None else header,
-        newest=newest,
+        newest=newest_average(run, newest),
     )
 
 

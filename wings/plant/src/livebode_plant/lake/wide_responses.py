@@ -295,6 +295,7 @@ def matrices_from_wide(entries: pa.Table, covariance: pa.Table, summary: Mapping
         sample=first.sample,
         time_s=first.time_s,
         units=tuple(map(tuple, found["units"])),
+        variation=np.stack([np.stack([each[o, i].variation for i in inputs], axis=-1) for o in outputs], axis=-2),
     )
 
 
