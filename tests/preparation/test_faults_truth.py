@@ -16,7 +16,7 @@ import pytest
 import livebode as lb
 from livebode.configuration import Axis
 from livebode.core import Block, Lines, SignalError
-from livebode.estimation import RepeatedSpikes, Settings, TurningSpikes
+from livebode.estimation import RepeatedSpikes, SensorSpikes, Settings
 from livebode.excitation import multisine
 from livebode.preparation import FaultSearch
 from livebode.runtime import Destination, run
@@ -43,7 +43,7 @@ def stepped(y: np.ndarray) -> np.ndarray:
     return np.round(y / STEP) * STEP
 
 
-def searched(y: np.ndarray, pieces: int = 1) -> list[RepeatedSpikes | TurningSpikes]:
+def searched(y: np.ndarray, pieces: int = 1) -> list[SensorSpikes]:
     search, u = FaultSearch(SETTINGS, 0), signals()[0]
     block = Block([u, y], ("u", "y"), RATE_HZ)
     edges = np.linspace(0, y.size, pieces + 1).astype(int)

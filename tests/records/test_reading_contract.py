@@ -20,7 +20,7 @@ import pytest
 from livebode.configuration import RecordSection
 from livebode.core import Block, Event, RecordError
 from livebode.estimation import Tracker
-from livebode.records import RunDirectory, RunRecord, each_event
+from livebode.records import RunDirectory, RunRecord, each_event, query
 from tests.support.command import RATE_HZ, livebode, signals, write_parquet
 from tests.support.errors import refused
 from tests.support.recorded import (
@@ -228,6 +228,18 @@ def test_the_same_command_continues_where_it_was_ended(
     assert (tmp_path / "run" / "bode.svg").stat().st_size > 3_000
     assert "is finished" in livebode("run", *given).err
     assert livebode("run", *given, "--force").code == 0
+
+
+def test_averages_in_sql_leave_out_missing_values_of_either_precision(tmp_path: Path) -> None:
+    pytest.importorskip("duckdb", reason="DuckDB is not installed")
+    record_machine(machine(SAMPLES), tmp_path / "run")
+    run = RunRecord.open(tmp_path / "run")
+    responses = run.responses()
+    for name in ("coherence", "sigma"):  # four bytes, and eight
+        values = getattr(responses, name)
+        assert 0 < np.isnan(values).sum() < values.size
+        (row,) = query(run, f"SELECT avg({name}), count({name}) FROM responses", 1).rows
+        assert row == pytest.approx((np.nanmean(values), np.isfinite(values).sum()), rel=1e-6)
 
 
 def test_other_tools_read_the_segments(tmp_path: Path) -> None:

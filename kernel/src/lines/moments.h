@@ -25,6 +25,11 @@ typedef struct {
     lb_lanes of[4];
 } lb_deviation;
 
+/* Numerator over denominator, and 1/|denominator|². */
+typedef struct {
+    lb_lanes re, im, inverse;
+} lb_quotient;
+
 /* Sums of weights: Σλ^i, Σλ^2i, Σλ^3i, Σiλ^i, and Σλ^i(i − μ)², Σλ^2i(i − μ)². */
 typedef struct {
     double one, two, three, ages, spread, spread_two;
@@ -114,6 +119,13 @@ LB_INLINE lb_deviation lb_add_window(lb_some_moments *s, double forgetting, doub
         s->scatter[q] = s->scatter[q] * forgetting + found[q] * kept;
     }
     return (lb_deviation){{nr, ni, dr, di}};
+}
+
+LB_INLINE lb_quotient lb_divided(const lb_lanes *pair)
+{
+    const lb_lanes nr = pair[NUM_RE], ni = pair[NUM_IM], dr = pair[DEN_RE], di = pair[DEN_IM];
+    const lb_lanes inverse = 1.0 / (dr * dr + di * di);
+    return (lb_quotient){(nr * dr + ni * di) * inverse, (ni * dr - nr * di) * inverse, inverse};
 }
 
 #endif

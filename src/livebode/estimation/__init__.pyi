@@ -51,6 +51,7 @@ from livebode.estimation.tracker_settings import divisors as divisors
 from livebode.estimation.tracker_settings import nearest_hop as nearest_hop
 from livebode.estimation.tracker_settings import quarter_hop as quarter_hop
 from livebode.estimation.trend import RepeatedSpikes as RepeatedSpikes
+from livebode.estimation.trend import SensorSpikes as SensorSpikes
 from livebode.estimation.trend import SignalTrend as SignalTrend
 from livebode.estimation.trend import TrendStretch as TrendStretch
 from livebode.estimation.trend import TurningSpikes as TurningSpikes

@@ -112,7 +112,7 @@ class DistortionLevels(StatefulBase):
     _STATE = ("_mean", "_spread", "_now", "_stretches", "_periods", "_power", "_scatter", "_output")
 
     def __init__(self, settings: Settings) -> None:
-        lines, method = settings.lines, settings.method
+        lines = settings.lines
         even, odd = detection_bins(lines)
         self._kinds = {"even": slice(0, even.size), "odd": slice(even.size, even.size + odd.size)}
         self.bins = np.concatenate([even, odd])
@@ -121,10 +121,10 @@ class DistortionLevels(StatefulBase):
         self._interpolation = Interpolation(bins, self.bins)
         self._at, self._lines, self._beside = np.concatenate([bins, self.bins]), len(bins), slice(len(bins), None)
         differenced, advanced = np.array(settings.differenced_roles), np.array(settings.advanced_ticks)
-        rows = [settings.roles.index(role) for role in ("output", method.denominator, method.reference)]
+        rows = list(settings.signals)
         self._after = after(self._at, lines.window, differenced, advanced)[rows]
         self._places = np.ix_(np.asarray(rows), self._at)
-        self._excited = _SAME_EXCITATION if method.reference == "excitation" else _SAME_INPUT
+        self._excited = _SAME_EXCITATION if settings.method.reference == "excitation" else _SAME_INPUT
         self._begin()
         self._stretches = self._periods = 0
         self._power, self._scatter, self._output = (

@@ -91,7 +91,7 @@ class LineStage(StatefulBase):
         noise, noise_dof = NOISE_SCATTER, np.inf
         if self._detection is not None:
             noise, noise_dof = NOISE_LARGER if s.noise == "quiet" else NOISE_MOVING, self._detection.dof
-        denominator, reference = (self._roles.index(role) for role in (s.method.denominator, s.method.reference))
+        _, denominator, reference = s.signals
         weighting = weights.forgetting, weights.table
         check_instruction_set()
         return LineSettings(*weighting, s.average, denominator, reference, noise, noise_dof, chosen_instruction_set())

@@ -10,13 +10,11 @@ from numpy.typing import NDArray
 from livebode.arrays import Complex, Flags, Floats
 from livebode.core import Event, Stage, StatefulBase
 from livebode.estimation.moving_distortion import DistortionRows, MovingDistortion, PeriodsAtBins
-from livebode.estimation.periods import Periods
+from livebode.estimation.periods import Periods, judged_every
 from livebode.estimation.products import times
 from livebode.estimation.spectra import after
-from livebode.estimation.tracker_settings import Role, Settings
+from livebode.estimation.tracker_settings import Settings
 from livebode.language import Message
-
-_JUDGED_PER_S = 10  # times at most; of shorter periods the mean over some is judged
 
 
 class MovingVerdicts(NamedTuple):
@@ -75,17 +73,16 @@ class MovingPeriods(StatefulBase):
     def __init__(
         self, settings: Settings, events: list[Event], *, enabled: bool = True, of_residual: bool = False
     ) -> None:
-        lines, method = settings.lines, settings.method
+        lines = settings.lines
         self._settings, self._events = settings, events
-        self._distortion = MovingDistortion(lines, instrument=method.reference == "excitation")
-        names: tuple[Role, Role, Role] = "output", method.denominator, method.reference
-        roles = [settings.roles.index(name) for name in names]
+        self._distortion = MovingDistortion(lines, instrument=settings.method.reference == "excitation")
+        roles = settings.signals
         self._signals = np.array([len(settings.roles) if of_residual else roles[0], *roles])
         at = self._distortion.at
         self.is_possible = enabled and at.size > 0 and settings.schedule is not None and not settings.hann
         differenced, advanced = np.array(settings.differenced_roles), np.array(settings.advanced_ticks)
         self._after = after(at, lines.window, differenced, advanced)[[roles[0], *roles]][:, np.newaxis]
-        self._each = max(1, round(lines.rate_hz / lines.window / _JUDGED_PER_S))
+        self._each = judged_every(lines)
         self._sum, self._position = np.zeros((4, at.size), dtype=np.complex128), 0.0
         self._periods, self._moved = 0, False
         self.told = np.zeros(len(lines), dtype=np.bool_)
@@ -110,15 +107,15 @@ class MovingPeriods(StatefulBase):
         self._distortion.end_stretch()
         self._sum[:], self._position, self._periods = 0, 0.0, 0
 
-    def process(self, spectra: Complex, periods: Periods, moves: Flags, clock: PeriodClock) -> None:
-        """Add consecutive periods with their spectra, shape (signals, periods, bins)."""
+    def process(self, periods: Periods, moves: Flags, clock: PeriodClock) -> None:
+        """Add consecutive periods."""
         now, which = self._distortion.now, np.zeros(len(moves), dtype=np.int64)
         usable = moves & periods.complete
         if not self.is_possible or periods.schedule is None or not usable.any():
             self.end_stretch()
         else:
             # An incomplete period, which is not used, may be infinite.
-            at_bins = np.where(usable[:, np.newaxis], spectra[self._signals][:, :, self._distortion.at], 0)
+            at_bins = np.where(usable[:, np.newaxis], periods.spectra[self._signals][:, :, self._distortion.at], 0)
             of_periods = times(at_bins, self._after)
             groups, usable, last = self._grouped(of_periods, periods.schedule.mean(axis=1), usable)
             if last.size:

@@ -3,19 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from math import ceil, log
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from livebode.arrays import Complex, Floats
-from livebode.core import Stage, StatefulBase
+from livebode.arrays import Complex, Flags, Floats
+from livebode.core import Lines, Stage, StatefulBase
 from livebode.dataclass import dataclass
 from livebode.kernel import CHANGES, MEANS, PLACE, SCATTER, LineMoments, WeightSums
 
+_JUDGED_PER_S = 10  # times at most; for short periods a verdict in each period is not needed
 _TOGETHER = 1 << 15  # samples of a signal in one batch: a few of such signals, and their spectra, stay in the cache
+
+
+def judged_every(lines: Lines) -> int:
+    """Periods from one verdict on errors that repeat to the next."""
+    return max(1, round(lines.rate_hz / lines.window / _JUDGED_PER_S))
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,8 +42,25 @@ class Periods:
 
     signals: Floats
     schedule: Floats | None
-    complete: NDArray[np.bool_]
+    complete: Flags
     stop: int
+
+    @classmethod
+    def of(cls, signals: Floats, schedule: Floats | None, complete: Flags, stop: int) -> Periods:
+        """Of samples that begin with a period: `signals` is (signals, samples), `schedule` (samples,)."""
+        count = len(complete)
+        return cls(
+            signals.reshape(len(signals), count, -1),
+            None if schedule is None else schedule.reshape(count, -1),
+            complete,
+            stop,
+        )
+
+    @cached_property
+    def spectra(self) -> Complex:
+        """DFT of each period, shape (signals, periods, bins); of an incomplete one, which is not used, any number."""
+        with np.errstate(all="ignore"):
+            return np.fft.rfft(self.signals)
 
 
 class PeriodCutter(StatefulBase):
@@ -86,12 +109,7 @@ class PeriodCutter(StatefulBase):
             last = min(count, first + together)
             begin, end = first * window - offset, last * window - offset
             signals, position = self._signals(data, begin, end), self._positions(schedule, begin, end)
-            yield Periods(
-                self._differences(signals).reshape(len(data), last - first, window),
-                None if position is None else position.reshape(last - first, window),
-                complete[first:last],
-                begin + window,
-            )
+            yield Periods.of(self._differences(signals), position, complete[first:last], begin + window)
             if last == count:
                 self._samples[:, 1:] = signals[:, -window:]
                 self._samples[:, 0] = self._samples[:, -1]

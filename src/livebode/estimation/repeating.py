@@ -240,14 +240,12 @@ class RepeatingErrors(PeriodCutter):
 
     def _verdicts(self, periods: Periods, block: Block, kind: QuantityKind | None) -> PeriodVerdicts:
         """Verdicts before and after each of these periods."""
-        with np.errstate(all="ignore"):  # an incomplete period is not used
-            spectra = np.fft.rfft(periods.signals)
         moves = self._moves(periods)
         unit = next((channel.unit for channel in block.channels if channel.name == self._settings.schedule), "")
         clock = PeriodClock(block.start + periods.stop - 1, block.origin_s, unit)
-        self._in_motion.process(spectra, periods, moves, clock)
+        self._in_motion.process(periods, moves, clock)
         now = PeriodSpectra(
-            spectra,
+            periods.spectra,
             periods.complete,
             moves,
             self._now.distortion,
@@ -261,7 +259,7 @@ class RepeatingErrors(PeriodCutter):
         self._now = Verdict(verdicts.distortion[-1].copy(), verdicts.against[-1].copy())
         happened = verdicts.happened.tolist()
         if self.levels.bins.size:
-            self._add_levels(spectra, happened)
+            self._add_levels(periods.spectra, happened)
         for period in (number for number, change in enumerate(happened) if change & NEWS):
             self._report(verdicts, period, block, block.start + periods.stop + period * self._window - 1, kind)
         return verdicts

@@ -18,7 +18,7 @@ from livebode.estimation.silence_search import HumSpan
 from livebode.estimation.spectra import LineSpectra
 from livebode.estimation.stream_estimator import Centre, InputStatistics, StreamEstimator, signals_of
 from livebode.estimation.tracker_settings import Settings
-from livebode.estimation.trend import RepeatedSpikes, SignalTrend, TurningSpikes
+from livebode.estimation.trend import SensorSpikes, SignalTrend
 
 NOTHING: Integers = np.zeros((0, 2), dtype=np.int64)
 """No stretch is set aside."""
@@ -105,7 +105,7 @@ class Tracker(StreamEstimator[InputStatistics]):
         self._watch = InputStatistics(self._events, window)
         self._end, self._aside = (0, 0.0), NOTHING
         self._trend: SignalTrend | None = None
-        self._sensor_spikes: Sequence[RepeatedSpikes | TurningSpikes] = ()
+        self._sensor_spikes: Sequence[SensorSpikes] = ()
         self._parts = {
             "spectra": self._spectra,
             "lines": self._lines,
@@ -140,7 +140,7 @@ class Tracker(StreamEstimator[InputStatistics]):
         """The trend of a whole recording, which is subtracted from the signals; the schedule is not changed."""
         self._trend = trend
 
-    def know_sensor_spikes(self, spikes: Sequence[RepeatedSpikes | TurningSpikes]) -> None:
+    def know_sensor_spikes(self, spikes: Sequence[SensorSpikes]) -> None:
         """Spikes in most of the periods of a whole recording, which are subtracted from the signals."""
         self._sensor_spikes = spikes
 

@@ -293,6 +293,14 @@ class Settings:
         return self.method.roles
 
     @property
+    def signals(self) -> tuple[int, int, int]:
+        """Places of output, denominator and reference among the roles."""
+        output, denominator, reference = map(
+            self.roles.index, ("output", self.method.denominator, self.method.reference)
+        )
+        return output, denominator, reference
+
+    @property
     def differenced_roles(self) -> tuple[bool, ...]:
         """Whether each of the roles' signals is differenced."""
         return tuple(self.channel(role) in self.differenced for role in self.roles)

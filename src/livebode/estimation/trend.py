@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Self
 
 import numpy as np
 
@@ -41,61 +43,70 @@ class TrendStretch:
 
 
 @dataclass(frozen=True, eq=False)
-class RepeatedSpikes:
-    """Spikes of a channel at the same places of every period.
+class SensorSpikes(ABC):
+    """Spikes of a channel that are subtracted.
 
     Attributes
     ----------
     channel
         Its name.
-    places, sizes
-        Numbers of the samples modulo the window, and what is subtracted from them, shape (spikes,) each.
+    sizes
+        What is subtracted, shape (spikes,).
+    """
+
+    channel: str
+    sizes: Floats
+
+    @property
+    def largest(self) -> float:
+        """Size of the largest one."""
+        return float(np.abs(self.sizes).max())
+
+    @abstractmethod
+    def of(self, start: int, stop: int) -> Floats:
+        """The spikes in the samples start … stop − 1, (samples,)."""
+
+    @abstractmethod
+    def shifted(self, samples: int) -> Self:
+        """The spikes of a recording whose samples have numbers that are larger by so many."""
+
+
+@dataclass(frozen=True, eq=False)
+class RepeatedSpikes(SensorSpikes):
+    """Spikes at the same places of every period.
+
+    Attributes
+    ----------
+    places
+        Numbers of the samples modulo the window, shape (spikes,).
     window
         Samples of a period.
     """
 
-    channel: str
     places: Integers
-    sizes: Floats
     window: int
 
     def of(self, start: int, stop: int) -> Floats:
-        """The spikes in the samples start … stop − 1, (samples,)."""
         period = np.zeros(self.window)
         period[self.places] = self.sizes
         return period[np.arange(start, stop) % self.window]
 
-    @property
-    def largest(self) -> float:
-        """Size of the largest one."""
-        return float(np.abs(self.sizes).max())
-
-    def shifted(self, samples: int) -> RepeatedSpikes:
-        """The spikes of a recording whose samples have numbers that are larger by so many."""
+    def shifted(self, samples: int) -> Self:
         return replace(self, places=(self.places + samples) % self.window)
 
 
 @dataclass(frozen=True, eq=False)
-class TurningSpikes:
-    """Spikes of a channel at any samples: their numbers, ascending, and what is subtracted, (spikes,) each."""
+class TurningSpikes(SensorSpikes):
+    """Spikes at any samples: their numbers, ascending, shape (spikes,)."""
 
-    channel: str
     samples: Integers
-    sizes: Floats
 
     def of(self, start: int, stop: int) -> Floats:
-        """The spikes in the samples start … stop − 1, (samples,)."""
         found, some = np.zeros(stop - start), slice(*np.searchsorted(self.samples, [start, stop]))
         found[self.samples[some] - start] = self.sizes[some]
         return found
 
-    @property
-    def largest(self) -> float:
-        """Size of the largest one."""
-        return float(np.abs(self.sizes).max())
-
-    def shifted(self, samples: int) -> TurningSpikes:
-        """The spikes of a recording whose samples have numbers that are larger by so many."""
+    def shifted(self, samples: int) -> Self:
         return replace(self, samples=self.samples + samples)
 
 

@@ -14,10 +14,10 @@ from livebode.core import Lines, QuantityKind, f_quantile
 from livebode.dataclass import dataclass
 from livebode.estimation.detection import Groups, Interpolation
 from livebode.estimation.hum import Neighbours, mains_of
-from livebode.estimation.periods import Moments
+from livebode.estimation.periods import Moments, judged_every
 from livebode.estimation.products import divided, power, times
 from livebode.estimation.spectra import after
-from livebode.estimation.tracker_settings import Role, Settings
+from livebode.estimation.tracker_settings import Settings
 from livebode.kernel import (
     REASONS,
     PeriodSpectra,
@@ -191,7 +191,6 @@ Reason = tuple[Message, dict[str, float]]
 
 KINDS = ("distorted", "hum", "steps")
 DISTORTED, HUM = KINDS.index("distorted"), KINDS.index("hum")
-_JUDGED_PER_S = 10  # times at most; for short periods a verdict in each period is not needed
 
 
 @dataclass(frozen=True, eq=False)
@@ -294,7 +293,7 @@ class Judge:
         difference = np.abs(1 - 1 / lines.z)
         self.to_output = difference**-differences
         self.of_step = difference if output in ("velocity", "position", None) else 1 / self.to_output
-        self.judged_every = max(1, round(lines.rate_hz / lines.window / _JUDGED_PER_S))
+        self.judged_every = judged_every(lines)
         self._plan = self._plan_of(len(differenced))
 
     def _plan_of(self, signals: int) -> RepeatingPlan:
@@ -336,13 +335,9 @@ def _tones(beside: Neighbours) -> Tones:
 
 def judge_of(settings: Settings, kind: QuantityKind | None) -> Judge:
     """The Judge for these settings and an output of this kind; several trackers of the same lines have the same one."""
-    method = settings.method
-    names: tuple[Role, Role, Role] = "output", method.denominator, method.reference
-    output, denominator, reference = map(settings.roles.index, names)
-    instrument = method.reference == "excitation"
+    instrument = settings.method.reference == "excitation"
     differenced, advanced = settings.differenced_roles, settings.advanced_ticks
-    signals = output, denominator, reference
-    return _judge(settings.lines, signals, instrument, settings.hann, differenced, advanced, kind)
+    return _judge(settings.lines, settings.signals, instrument, settings.hann, differenced, advanced, kind)
 
 
 @lru_cache(maxsize=64)

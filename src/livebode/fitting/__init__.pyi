@@ -39,8 +39,8 @@ from livebode.fitting.physical import EvaluationGrid as EvaluationGrid
 from livebode.fitting.physical import Hold as Hold
 from livebode.fitting.physical import Parameter as Parameter
 from livebode.fitting.physical import PhysicalModel as PhysicalModel
-from livebode.fitting.pole_search import Kind as Kind
-from livebode.fitting.pole_search import possible as possible
+from livebode.fitting.pole_kinds import Kind as Kind
+from livebode.fitting.pole_kinds import possible as possible
 from livebode.fitting.pole_search import reduced_structures as reduced_structures
 from livebode.fitting.pole_search import search as search
 from livebode.fitting.problem import described as described

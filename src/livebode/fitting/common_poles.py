@@ -17,7 +17,8 @@ from livebode.fitting.mean import mean_response
 from livebode.fitting.partial_fractions import PartialFractions, PoleQuantities
 from livebode.fitting.patterns import RUNS, neighbours
 from livebode.fitting.physical import EvaluationGrid, Hold
-from livebode.fitting.pole_search import ORDER_MAX, Kind, possible, search
+from livebode.fitting.pole_kinds import Kind, possible
+from livebode.fitting.pole_search import ORDER_MAX, search
 from livebode.fitting.problem import MeasuredRows
 from livebode.fitting.rows import EPSILON_MAX, NO_FIT, NO_RESPONSE, NOT_CONVERGED, NOT_SEEN, SENTENCES
 from livebode.fitting.separable import Outputs, SeparatedFit, whole_covariance

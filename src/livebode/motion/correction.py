@@ -28,7 +28,7 @@ from livebode.motion.learner import Learner, ReplayResult, frozen
 from livebode.motion.model import MovingModel
 from livebode.motion.orders import RippleMonitor
 from livebode.motion.replay import Scatter, by_excitation, drive_of, residual
-from livebode.motion.residual_distortion import ResidualDistortion, widened
+from livebode.motion.residual_distortion import ResidualDistortion, with_distortion
 from livebode.motion.standstill import StandstillDetector, without
 
 
@@ -366,7 +366,7 @@ class MotionCorrection(StatefulBase):
         return replace(
             tracked,
             value=np.where(valid, value, complex(np.nan, np.nan)),
-            sigma=np.where(valid, widened(np.hypot(seen.sigma * scale, ripple), distortion), np.nan),
+            sigma=np.where(valid, with_distortion(np.hypot(seen.sigma * scale, ripple), distortion), np.nan),
             dof=seen.dof,
             valid=valid,
             distortion=np.where(against & ~at_standstill, np.inf, distortion),

@@ -59,13 +59,12 @@ class ResidualDistortion(StatefulBase):
         channels = {"output": chunk.y, "input": chunk.u, "excitation": chunk.w}
         rows: list[Floats] = [channels[role] for role in self._settings.roles]
         part = slice(begin - chunk.start, begin - chunk.start + count * self._window)
-        signals = np.array([row[part].reshape(count, self._window) for row in (*rows, residual)])
-        complete = np.isfinite(signals).all(axis=(0, 2))
-        spectra = np.fft.rfft(np.nan_to_num(signals))
-        periods = Periods(signals, chunk.x[part].reshape(count, self._window), complete, self._window)
-        self._periods.process(spectra, periods, np.ones(count, dtype=np.bool_), clock)
+        signals = np.array([row[part] for row in (*rows, residual)])
+        complete = np.isfinite(signals).all(axis=0).reshape(count, self._window).all(axis=1)
+        periods = Periods.of(signals, chunk.x[part], complete, self._window)
+        self._periods.process(periods, np.ones(count, dtype=np.bool_), clock)
 
 
-def widened(sigma: Floats, distortion: Floats) -> Floats:
+def with_distortion(sigma: Floats, distortion: Floats) -> Floats:
     """Sigma with the distortion where it is known."""
     return np.asarray(np.hypot(sigma, np.where(np.isfinite(distortion), distortion, 0.0)))

@@ -9,7 +9,7 @@ import numpy as np
 from livebode.arrays import Flags, Floats, Integers
 from livebode.core import Block, Event, SignalError, step_of
 from livebode.dataclass import dataclass
-from livebode.estimation import RepeatedSpikes, Settings, TurningSpikes
+from livebode.estimation import RepeatedSpikes, SensorSpikes, Settings, TurningSpikes
 from livebode.excitation import cut, filled
 from livebode.language import Message
 from livebode.preparation._steady import EXAMINED_SAMPLES_MAX, moves
@@ -85,7 +85,7 @@ class FaultSearch:
         self._parts.append(block.rows(self.channels)[:, : EXAMINED_SAMPLES_MAX - self._count])
         self._count += self._parts[-1].shape[1]
 
-    def finish(self, transient: int = 0) -> list[RepeatedSpikes | TurningSpikes]:
+    def finish(self, transient: int = 0) -> list[SensorSpikes]:
         """The spikes behind the transient, in periods; SignalError for an output that is cut off or has a dead band."""
         window = self._settings.lines.window
         rows = np.concatenate(self._parts, axis=1)[:, transient * window :] if self._parts else np.zeros((1, 0))
@@ -99,14 +99,14 @@ class FaultSearch:
         reference = rows[self.names.index(str(self._settings.channel(self._settings.method.reference)))]
         if not _has_levels(reference) and (flat := flat_part(rows[output], window)):
             raise _flat_error(self._settings.output, flat)
-        found: list[RepeatedSpikes | TurningSpikes] = []
+        found: list[SensorSpikes] = []
         for name, x in zip(self.names, rows):
             if name not in self._settings.differenced and np.isfinite(x).any():
                 whole = np.isfinite(x).reshape(-1, window).all(axis=1)
                 found += self._spikes(name, cut(filled(x), window), whole, self._first + transient * window)
         return found
 
-    def _spikes(self, name: str, blocks: Floats, whole: Flags, first: int) -> list[RepeatedSpikes | TurningSpikes]:
+    def _spikes(self, name: str, blocks: Floats, whole: Flags, first: int) -> list[SensorSpikes]:
         """The spikes of a channel in those of these periods that are whole; the first sample has this number."""
         window = blocks.shape[1]
         together = 2 if len(blocks) >= 2 * _PERIODS_MIN else 1  # a spike at every second period is in half of them
@@ -115,17 +115,17 @@ class FaultSearch:
         excited[together * np.asarray(self._settings.lines.bins)] = True
         used = len(blocks) // together * together
         pairs = blocks[:used].reshape(-1, long)[whole[:used].reshape(-1, together).all(axis=1)]
-        found: list[RepeatedSpikes | TurningSpikes] = []
+        found: list[SensorSpikes] = []
         if len(pairs) * together < _PERIODS_MIN:
             return found
         places, sizes = repeated_spikes(pairs, excited)
         if places.size:
-            repeated = RepeatedSpikes(name, (places + first) % long, sizes, long)
+            repeated = RepeatedSpikes(name, sizes, (places + first) % long, long)
             found.append(repeated)
             blocks = blocks - repeated.of(first, first + blocks.size).reshape(blocks.shape)
         samples, sizes = turning_spikes(blocks[whole])
         samples = np.flatnonzero(whole)[samples // window] * window + samples % window
-        return [*found, TurningSpikes(name, samples + first, sizes)] if samples.size else found
+        return [*found, TurningSpikes(name, sizes, samples + first)] if samples.size else found
 
 
 def _changes_place(schedule: Floats) -> bool:
@@ -291,7 +291,7 @@ def _flat_error(name: str, flat: FlatPart) -> SignalError:
     )
 
 
-def spikes_event(found: Sequence[RepeatedSpikes | TurningSpikes], source: AlignedLog, settings: Settings) -> Event:
+def spikes_event(found: Sequence[SensorSpikes], source: AlignedLog, settings: Settings) -> Event:
     """One Event for the spikes that are subtracted."""
     units = {channel.name: channel.unit for channel in source.channels}
     spikes = Message.conjunction(
@@ -302,7 +302,7 @@ def spikes_event(found: Sequence[RepeatedSpikes | TurningSpikes], source: Aligne
     return Event("spikes-subtracted", source.first, source.first / settings.lines.rate_hz, message, {"spikes": facts})
 
 
-def _sentence(spikes: RepeatedSpikes | TurningSpikes, unit: str) -> Message:
+def _sentence(spikes: SensorSpikes, unit: str) -> Message:
     name, count, size = repr(spikes.channel), spikes.sizes.size, spikes.largest
     if isinstance(spikes, RepeatedSpikes):
         return Message(

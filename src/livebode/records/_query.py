@@ -169,5 +169,5 @@ def _plain(event: Event, clock: RunClock) -> dict[str, Any]:
 
 def _nan_as_null(schema: pa.Schema) -> str:
     """All columns, with null for missing values, which SQL's averages ignore."""
-    numbers = [field.name for field in schema if pa.types.is_float64(field.type) and field.name not in _NEVER_MISSING]
+    numbers = [field.name for field in schema if pa.types.is_floating(field.type) and field.name not in _NEVER_MISSING]
     return "* REPLACE (" + ", ".join(f"CASE WHEN isnan({n}) THEN NULL ELSE {n} END AS {n}" for n in numbers) + ")"

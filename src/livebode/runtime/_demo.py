@@ -9,6 +9,7 @@ from livebode.core import Lines, UsageError
 from livebode.estimation import Settings, Tracker, plant_kinds
 from livebode.excitation import multisine
 from livebode.monitoring import Baseline, Monitor, learn_machine
+from livebode.runtime.allocation import keep_freed_memory
 from livebode.runtime.change_detection import ChangeDetection
 from livebode.runtime.estimate import Outcome
 from livebode.runtime.feed import Feed
@@ -99,6 +100,7 @@ def demo(to: Destination, *, seconds: float, seed: int, real_time: bool, baselin
         ChangeDetection(Monitor(baseline, settings), f"{LEARNED_S:g} s of healthy strokes"),
     )
     about = {"configuration": configuration, "found": {"clock": "relative"}}
+    keep_freed_memory()
     feed = Feed(machine, block_samples=400, real_time=real_time)
     return RunLoop(feed, estimate, to, about=about).run()
 

@@ -36,6 +36,7 @@ def run(axis: Axis, to: Destination, control: RunControl | None = None) -> Outco
         If `control` ends a recording before its end; the directory is as for an error.
     """
     control, started = control or RunControl(), time.perf_counter()
+    keep_freed_memory()
     kind = axis.kind
     if not axis.source.live:
         to.announce(RunStep("opening"))
@@ -44,7 +45,6 @@ def run(axis: Axis, to: Destination, control: RunControl | None = None) -> Outco
         from livebode.runtime.live import run_live
 
         return run_live(axis, to, control)
-    keep_freed_memory()
     of: ExaminedRecording = rule(kind, "recording")(named, logs, to)
     about = {"configuration": of.axis.model_dump(mode="json", exclude=NOT_RECORDED, by_alias=True), "found": of.found}
     about |= provenance(of.axis, of.digests)

@@ -32,7 +32,7 @@ def share_between_threads() -> None:
 
 
 def keep_freed_memory() -> None:
-    """Let glibc retain the memory of freed arrays, where `share_between_threads` gave it no threshold.
+    """Let glibc retain the memory of freed arrays, where `share_between_threads` gave it no threshold; once for a run.
 
     It returns them to the system, and requests them again page by page for the next block: a third of the tracker's
     time. After an array of this size was freed, it retains the memory of smaller ones.

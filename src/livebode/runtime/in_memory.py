@@ -9,6 +9,7 @@ from typing import Any, Self
 from livebode.configuration import Axis
 from livebode.core import Event, Responses
 from livebode.estimation import Follower
+from livebode.runtime.allocation import keep_freed_memory
 from livebode.runtime.documents import Document
 from livebode.runtime.feed import Feed
 from livebode.runtime.recorder import Destination, RecordInOnePiece
@@ -57,6 +58,7 @@ def follow_recording(axis: Axis, log: Log, follower: Follower, take: Callable[[R
     LivebodeError
         As `run`.
     """
+    keep_freed_memory()
     record = RecordInMemory(take)
     to = Destination(record.path, _draw_nothing, record=record)
     of = examined_recording(axis, log, follower, to)

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any, Self
 from livebode.configuration import RecordSection
 from livebode.core import Block, Event, LivebodeError, Responses, SignalError
 from livebode.preparation import ChannelCheck, check_length
-from livebode.runtime.allocation import keep_freed_memory
 from livebode.runtime.documents import (
     Channels,
     ClockSet,
@@ -118,7 +117,6 @@ class RunLoop:
         about: dict[str, Any],
         segments: RecordSection | None = None,
     ) -> None:
-        keep_freed_memory()
         self.feed, self.to, self.estimate = feed, to, estimate
         self._source, self._control = feed.source, feed.control
         self._blocks = feed.blocks(estimate.channels)

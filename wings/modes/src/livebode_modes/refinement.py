@@ -115,12 +115,13 @@ class Refinement:
         return best, evidence
 
     def _region(self, spectrum: Spectrum, mode: Mode, others: list[Mode]) -> tuple[slice, list[Mode]]:
-        """The bins around a mode and the others whose bins overlap these."""
+        """The bins around a mode, and the others with skirts in them: whose bins are nearer than half as many."""
         around = spectrum.region(mode.frequency_hz, max(mode.damping, 0.0), self._limits_hz)
         low, high, inside = around.start, around.stop, list[Mode]()
         for other in others:
             of_other = spectrum.region(other.frequency_hz, other.damping, self._limits_hz)
-            if of_other.start < around.stop and around.start < of_other.stop:
+            near = (of_other.stop - of_other.start) // 2
+            if of_other.start - near < around.stop and around.start < of_other.stop + near:
                 low, high = min(low, of_other.start), max(high, of_other.stop)
                 inside.append(other)
         return slice(low, high), inside

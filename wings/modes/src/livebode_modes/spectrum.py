@@ -15,7 +15,11 @@ with needing("SciPy", "analysis", "a run from the outputs alone"):
     import scipy  # its parts are loaded when they are first used
 
 _TAPERED = 0.2  # of the window: lines and the rigid motion leak less, for 5 % more sigma
-_REACH, _BINS_MIN = 3.0, 12.0  # region on either side of a mode, in half-power widths; bins at least
+_REACH, _REACH_MIN, _SHARE, _BINS_MIN = 8.0, 3.0, 0.25, 12.0
+"""Region on either side of a mode, in half-power widths: it tells the frequency from a skewed resonance.
+
+Further away than a quarter of the frequency the force is not white; three widths, and twelve bins, are in any case.
+"""
 _GAIN_MIN = 1e-3
 _FOLDS = np.array([-2, -1, 1, 2])
 
@@ -82,7 +86,9 @@ class Spectrum:
     def region(self, frequency_hz: float, damping: float, limits_hz: tuple[float, float]) -> slice:
         """The bins around a mode that inform about it."""
         resolution_hz = float(self.frequency_hz[1])
-        reach_hz = max(_REACH * 2 * damping * frequency_hz, _BINS_MIN * resolution_hz)
+        width_hz = 2 * damping * frequency_hz
+        near_hz = min(_REACH * width_hz, _SHARE * frequency_hz)
+        reach_hz = max(_REACH_MIN * width_hz, near_hz, _BINS_MIN * resolution_hz)
         low_hz, high_hz = max(frequency_hz - reach_hz, limits_hz[0]), min(frequency_hz + reach_hz, limits_hz[1])
         return slice(max(int(np.ceil(low_hz / resolution_hz)), 1), int(high_hz / resolution_hz) + 1)
 
