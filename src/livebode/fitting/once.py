@@ -60,7 +60,8 @@ class Fit:
         Correlation of the residuals of neighbouring lines, if they follow a pattern that no model explains; else None.
     competitors
         Model that all have in common, parameters (a row for each), and weights of the models that the lines do not tell
-        apart; None where there is only the fitted one.
+        apart; None where there is only the fitted one. A model with a mode above the lines has two rows, with less and
+        with more damping of this mode.
     averaged
         Model and parameters of the average over all models that the lines do not tell apart; see `with_unseen`.
     refusal
