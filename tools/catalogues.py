@@ -26,7 +26,7 @@ from livebode.analysis import MARGIN_NAMES as MARGINS
 from livebode.dashboard.quantities import QUANTITIES
 from livebode.estimation.verdicts import KINDS as DOUBTS
 from livebode.fitting import model_named
-from livebode.fitting.extended import LAG, MODE, RESIDUAL, ExtendedModel
+from livebode.fitting.extended import COUPLING, LAG, MODE, RESIDUAL, ExtendedModel
 from livebode.fitting.models import MODELS
 from livebode.language import QUANTITY_NAMES
 from livebode.monitoring import ALARMS, RETURNS, UNMONITORED
@@ -81,7 +81,7 @@ def _names() -> set[str]:
     found = {*QUANTITIES, *QUANTITY_NAMES, *DIRECTIONS, *ALARMS, *RETURNS, *UNMONITORED, *CAUSES, *DOUBTS, *VALUES}
     found |= texts_of_tasks()
     for model in map(model_named, MODELS):
-        extended = ExtendedModel(model, (LAG, RESIDUAL, MODE), 100.0)
+        extended = ExtendedModel(model, (LAG, RESIDUAL, MODE, COUPLING), 100.0)
         found |= {name.replace("_", " ") for name in (*extended.names, *model.derived_names)}
     return found | {name.replace("_", " ") for name in MARGINS}
 

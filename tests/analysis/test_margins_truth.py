@@ -9,8 +9,11 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from scipy.optimize import brentq
+from scipy.stats import norm
 
 from livebode.analysis import Margins, OpenLoop, against_lines, margins, margins_of
+from livebode.arrays import Floats
 from livebode.core import PID, FitError, LivebodeError, Loop, Responses, UsageError
 from livebode.fitting import EvaluationGrid, Fitter, Rigid, fit
 from tests.support.belt_loops import BAND_HZ, LINES, read, responses_of
@@ -170,7 +173,8 @@ def test_lines_do_not_contradict_true_margins() -> None:
 
 
 def test_bounds_of_margins_contain_the_models_that_the_lines_do_not_tell_apart() -> None:
-    """Of a fit with competitors the variance is that of the mixture: own variances, and distances, by the weights."""
+    """Of a fit with competitors the bound contains 95 % of the mixture of their normal distributions, by the weights,
+    and the variance is at least that of the mixture."""
     f = LINES.frequency_hz
     value = MODEL.at([0.0028, 6.7, 5e5, 130.0, 0, 0, 3e-4], EvaluationGrid.of(LINES))
     rng, one = np.random.default_rng(4), np.zeros(1, dtype=int)
@@ -188,5 +192,13 @@ def test_bounds_of_margins_contain_the_models_that_the_lines_do_not_tell_apart()
         i = of.index(name)
         own, apart = each.sigma[:, i], each.value[:, i] - of.value[0, i]
         assert each.ok.all()
-        assert of.sigma[0, i] == pytest.approx(np.sqrt(np.average(own**2 + apart**2, weights=weight)), rel=1e-9)
+        root = np.sqrt(np.average(own**2 + apart**2, weights=weight))
+        half = brentq(_share_missing, 0.0, 20 * root, (apart, own, weight), xtol=1e-12)
+        assert of.sigma[0, i] == pytest.approx(max(root, half / norm.ppf(0.975)), rel=1e-9)
         assert of.bound()[0, i] >= 1.9 * own[0] * np.sqrt(weight[0])
+
+
+def _share_missing(half: float, apart: Floats, own: Floats, weight: Floats) -> float:
+    """From 95 %, of a mixture of normal distributions between -half and half."""
+    within = norm.cdf((half - apart) / own) - norm.cdf((-half - apart) / own)
+    return 0.95 - float(np.average(within, weights=weight))

@@ -3,22 +3,28 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from math import erf
 
 import numpy as np
 
 from livebode.analysis._margins import Margins
 from livebode.analysis.margin_reading import margins
 from livebode.analysis.open_loop import OpenLoop
-from livebode.core import Loop
+from livebode.arrays import Floats
+from livebode.core import COVERAGE, Loop, half_width
 from livebode.fitting import Fit
+
+_FACTOR = float(half_width(np.ones(1), COVERAGE)[0])
+_HALVINGS = 40  # of an interval, to 1e-12 of it
+_erf = np.vectorize(erf, otypes=[float])
 
 
 def margins_of(fit: Fit, loop: Loop) -> Margins:
     """Margins of a fit, one row, by `Fit.with_unseen` and by each of its competitors.
 
-    The square of sigma is the mean over the competitors, by their weights, of the square of a competitor's own sigma
-    and of the distance of its margin: beyond the lines, competitors that fit alike differ. The loop was measured while
-    it was closed, so one that would make it unstable is not one of them.
+    The bound contains 95 % of the competitors' distributions, by their weights, and the square of sigma is at least the
+    mean of the square of a competitor's own sigma and of the distance of its margin: beyond the lines, competitors that
+    fit alike differ. The loop was measured while it was closed, so one that would make it unstable is not one of them.
     """
     average = fit.with_unseen()
     around = OpenLoop(average.model, loop, fit.rate_hz, fit.hold)
@@ -38,9 +44,24 @@ def among_competitors(read: Margins, fit: Fit, loop: Loop) -> Margins:
         known = each.ok[:, np.newaxis] & np.isfinite(at) & np.isfinite(own)
         share = np.where(known, weight[:, np.newaxis], 0.0)
         total = share.sum(axis=0)
+        share = share / np.where(total > 0, total, 1.0)
         with np.errstate(invalid="ignore"):
-            square = np.where(known, own**2 + (at - middle) ** 2, 0.0)
-        spread = np.sqrt(np.sum(share * square, axis=0) / np.where(total > 0, total, 1.0))
+            apart = np.where(known, np.abs(at - middle), 0.0)
+        own = np.where(known, own, 0.0)
+        spread = np.maximum(np.sqrt(np.sum(share * (own**2 + apart**2), axis=0)), _covering(share, apart, own))
         columns[-1] = np.where(np.isfinite(middle) & (total > 0), spread, columns[-1])
         wider[sigma] = columns
     return replace(read, **wider)
+
+
+def _covering(share: Floats, apart: Floats, own: Floats) -> Floats:
+    """Sigma whose 95 % bound contains 95 % of normal distributions (rows, quantities) with these shares, distances and
+    sigmas."""
+    low, high = np.zeros(share.shape[1]), np.max(apart + 2 * _FACTOR * own, axis=0)
+    size = np.sqrt(2) * np.maximum(own, 1e-12 * high + 1e-300)
+    for _ in range(_HALVINGS):
+        middle = (low + high) / 2
+        inside = (_erf((middle - apart) / size) + _erf((middle + apart) / size)) / 2
+        enough = np.sum(share * inside, axis=0) >= COVERAGE
+        low, high = np.where(enough, low, middle), np.where(enough, middle, high)
+    return np.asarray(high / _FACTOR)

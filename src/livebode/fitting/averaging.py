@@ -12,7 +12,7 @@ from livebode.dataclass import dataclass
 from livebode.fitting.competitors import Competition, Competitor
 from livebode.fitting.extended import MODE, ExtendedModel
 from livebode.fitting.family import FamilyMember
-from livebode.fitting.physical import PhysicalModel
+from livebode.fitting.physical import DELAY, PhysicalModel
 
 _SHARE = 0.03  # least weight of all models with an effect, from which the average over all has it
 
@@ -45,34 +45,48 @@ def average(of: Competition) -> Average:
     values is a model that fits as they do.
     """
     effects = {e for e in of.family.effects if of.share(e) >= _SHARE} | of.every[0].of.member.effects
-    return _about(of, of.every, effects, of.every[0].of.free)
+    return _about(of, _mean(of, of.every), effects, of.every[0].of.free)
 
 
 def named_average(of: Competition) -> Average:
-    """Over those that differ from the best model in friction only; the others are in the covariance.
+    """In the best model and the frictions of the others: what else the best one lacks is in the covariance only.
 
-    Its model has no effect that the best one lacks, but friction.
+    Its own parameters are the mean over all competitors. Frictions and effects are the mean over those that differ from
+    the best one in friction only, moved as its covariance moves them with its own parameters: so it fits the lines.
     """
-    family, own = of.family, of.every[0].of.member.effects
-    frictions = set(family.base.frictions)
-    alike = [c for c in of.every if c.of.member.effects - frictions == own - frictions]
-    return _about(of, alike, own | {e for e in frictions if of.share(e) > 0}, of.every[0].of.free)
+    family, best = of.family, of.every[0]
+    effects, frictions = best.of.member.effects, set(family.base.frictions)
+    mean = _mean(of, [c for c in of.every if c.of.member.effects - frictions == effects - frictions])
+    own = np.array([name in family.base.names and name not in {DELAY, *frictions} for name in family.names])
+    moved, others = np.flatnonzero(best.of.free & own), np.flatnonzero(best.of.free & ~own)
+    step = _mean(of, of.every)[moved] - mean[moved]
+    mean[others] += _regression(best.covariance, others, moved) @ step
+    mean[moved] += step
+    free = best.of.free
+    return _about(of, _bounded(of, mean), effects | {e for e in frictions if of.share(e) > 0}, free)
+
+
+def _regression(covariance: Floats, of: NDArray[np.intp], by: NDArray[np.intp]) -> Floats:
+    """Change of the expected values of some parameters by each of others, (of, by)."""
+    sigma = np.sqrt(np.diag(covariance))
+    sigma = np.where(sigma > 0, sigma, 1.0)
+    matrix = covariance / np.outer(sigma, sigma)
+    slope = matrix[np.ix_(of, by)] @ np.linalg.pinv(matrix[np.ix_(by, by)], hermitian=True)
+    return np.asarray(slope * np.divide.outer(sigma[of], sigma[by]))
 
 
 def specified(of: Competition) -> Average:
     """Of the specified model itself: the covariance shows where all others are."""
     first = of.first
-    alone = Competitor(first, first.values, np.zeros((len(first.values),) * 2), 0.0)
-    return _about(of, [alone], first.member.effects, first.free)
+    return _about(of, first.values.copy(), first.member.effects, first.free)
 
 
-def _about(of: Competition, centre: Sequence[Competitor], effects: Collection[str], free: NDArray[np.bool_]) -> Average:
-    """Mean of some competitors, and the covariance of all about it, in the model that has these effects."""
+def _about(of: Competition, mean: Floats, effects: Collection[str], free: NDArray[np.bool_]) -> Average:
+    """These values, and the covariance of all competitors about them, in the model that has these effects."""
     family = of.family
     extras = tuple(e for e in family.extras if e in effects)
     unnamed = tuple(e for e in extras if e not in of.every[0].of.member.effects)
     model = ExtendedModel(family.base, extras, family.top_hz, unnamed) if extras else family.base
-    mean = _mean(of, centre)
     means, matrices = (np.array([getattr(c, name) for c in of.every]) for name in ("mean", "covariance"))
     apart = means - mean
     if MODE in family.effects:  # frequency and damping of a mode that a model lacks are not apart
@@ -98,8 +112,12 @@ def _mean(of: Competition, centre: Sequence[Competitor]) -> Floats:
     for name in ("mode", "mode_damping") if there.any() else ():
         each[:, family.index(name)] *= there
     mean = np.sum(each * np.array([c.mean for c in centre]), axis=0) / each.sum(axis=0)
-    low, high = (np.array([getattr(p, end) for p in family.model.parameters]) for end in ("low", "high"))
-    return np.asarray(mean.clip(low, high))
+    return _bounded(of, mean)
+
+
+def _bounded(of: Competition, values: Floats) -> Floats:
+    low, high = (np.array([getattr(p, end) for p in of.family.model.parameters]) for end in ("low", "high"))
+    return np.asarray(values.clip(low, high))
 
 
 def positive(matrix: Floats) -> Floats:

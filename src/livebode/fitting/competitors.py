@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Floats
 from livebode.dataclass import dataclass
-from livebode.fitting.extended import BEYOND, LAG, MODE, RESIDUAL
+from livebode.fitting.extended import BEYOND, COUPLING, LAG, MODE, RESIDUAL
 from livebode.fitting.family import NEAR_NYQUIST, Family, FamilyMember, FittedMember
 from livebode.fitting.physical import DELAY
 from livebode.fitting.problem import MeasuredRows, Problem
@@ -22,16 +22,21 @@ WINDOW = 7.0
 _LEVELS, _PARENTS = 6, 6
 # Required decreases of −2·ln(likelihood). A machine with friction has it at motor and load: they have one price.
 _FRICTION_PRICE = 6.0
-_PRICE = {DELAY: 4.0, LAG: 5.0, RESIDUAL: 5.0, MODE: 2.0}
+_PRICE = {DELAY: 4.0, LAG: 5.0, RESIDUAL: 5.0, MODE: 2.0, COUPLING: 4.0}
 _HELD_PRICE = 6.0  # of a mode above the lines whose frequency is held
 _DAMPING_PRICE = 4.0  # of a mode whose damping is free
 _APART = 0.15  # of a frequency of the model itself: a nearer further mode would change the model's own mode
 _MODES, _MODES_TRIED = 40, 2
+_LOWER = 1.0  # of −2·ln(likelihood): a difference that is no rounding of the search
 _LOWEST, _HIGHEST = 0.7, BEYOND  # of the lowest and of the highest line, where a further mode is looked for
 _DAMPINGS = (0.02, 0.1)
 _EARLIEST_TICKS = 2.0  # two signals of one tick may be logged so far apart, in either order
 _LAG_S = 1e-4  # start
 _UNCERTAIN = 0.5  # of a logarithm: a parameter that the lines do not show
+
+
+Start = tuple[FamilyMember, Floats, float]
+"""A model with start values and a start of ε."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,32 +81,70 @@ def compete(
     """All models within a window of evidence (Madigan and Raftery, J. Amer. Stat. Assoc. 89, 1994).
 
     From the specified model (`late`: with its delay), every effect is added to and removed from every model in the
-    window, until no model in it is new.
+    window, and delay and lag replace each other, until no model in it is new. A model is fitted again from a neighbour
+    that fits better: its first search may have ended in another minimum.
     """
     family = Family(problem, allowed.fixed, allowed.delay, allowed.top_hz, fitted.ended[0])
     start = FamilyMember(frozenset({DELAY} if late and allowed.delay else ()))
     values = family.without(family.padded(fitted.ended[0]), start)
     first = family.fitted([(start, values, float(fitted.epsilon[0]))], measured, noise_dof)[0]
-    known: dict[FamilyMember, FittedMember] = {start: first}
-    done: set[FamilyMember] = set()
-    lines = int(np.count_nonzero(measured.use))
+    search = _Search(family, first, measured)
     for _ in range(_LEVELS):
-        order = sorted(known, key=lambda m: known[m].misfit + price(m, lines))
-        least = known[order[0]].misfit + price(order[0], lines)
-        parents = [m for m in order if m not in done and known[m].misfit + price(m, lines) < least + WINDOW][:_PARENTS]
-        tried = [
-            one
-            for parent in parents
-            for one in _neighbours(family, known[parent], measured)
-            if one[0] not in known and 2 * lines > np.count_nonzero(family.free(one[0]))
-        ]
-        done |= set(parents)
-        if not tried:
+        if not (tried := search.starts()):
             break
-        for one in family.fitted(tried, measured, noise_dof):
-            if _possible(family, one) and (one.member not in known or one.misfit < known[one.member].misfit):
-                known[one.member] = one
-    return _weighed(family, first, list(known.values()), measured, noise_dof)
+        search.add(family.fitted(tried, measured, noise_dof))
+    return _weighed(family, first, list(search.known.values()), measured, noise_dof)
+
+
+class _Search:
+    """The models that are known, and those to be fitted next."""
+
+    def __init__(self, family: Family, first: FittedMember, measured: MeasuredRows) -> None:
+        self.known = {first.member: first}
+        self._family, self._measured = family, measured
+        self._lines = int(np.count_nonzero(measured.use))
+        self._done: set[FamilyMember] = set()
+        self._begun: dict[FamilyMember, float] = {}  # again, from a model of this misfit
+
+    def starts(self) -> list[Start]:
+        """Neighbours of the best models whose neighbours were not tried yet."""
+        order = sorted(self.known.values(), key=lambda one: cost(one, self._lines))
+        limit = cost(order[0], self._lines) + WINDOW
+        parents = [one for one in order if one.member not in self._done and cost(one, self._lines) < limit][:_PARENTS]
+        self._done |= {one.member for one in parents}
+        return [
+            start
+            for parent in parents
+            for start in _neighbours(self._family, parent, self._measured)
+            if 2 * self._lines > np.count_nonzero(self._family.free(start[0]))
+            and self._promises(start[0], parent, limit)
+        ]
+
+    def _promises(self, member: FamilyMember, parent: FittedMember, limit: float) -> bool:
+        """Whether the model is new, or its search may have ended in a minimum from which this parent leads to a lower
+        one, with a cost below the limit."""
+        if member not in self.known:
+            return True
+        highest = limit - price(member, self._lines)
+        now = self.known[member].misfit
+        if now < highest and parent.member.effects >= member.effects:
+            return False  # it has fewer parameters, and is in the window
+        if parent.misfit > min(highest, min(now, self._begun.get(member, np.inf)) - _LOWER):
+            return False
+        self._begun[member] = parent.misfit
+        return True
+
+    def add(self, fitted: list[FittedMember]) -> None:
+        """Models with a possible result, where they are new or better than before."""
+        for one in fitted:
+            before = self.known.get(one.member)
+            if _possible(self._family, one) and (before is None or one.misfit < before.misfit):
+                self.known[one.member] = one
+
+
+def cost(of: FittedMember, lines: int) -> float:
+    """−2·ln(likelihood) plus the prices of the effects."""
+    return of.misfit + price(of.member, lines)
 
 
 def price(member: FamilyMember, lines: int) -> float:
@@ -116,24 +159,27 @@ def price(member: FamilyMember, lines: int) -> float:
     return total
 
 
-Start = tuple[FamilyMember, Floats, float]
-
-
 def _neighbours(family: Family, of: FittedMember, measured: MeasuredRows) -> Iterator[Start]:
     """Each model that differs by one effect, with its start values and its start of ε."""
     effects, damped, held_at = of.member
     for name in family.effects:
         if name in effects:
-            less = FamilyMember(effects - {name}) if name == MODE else of.member._replace(effects=effects - {name})
+            less = of.member._replace(effects=effects - {name})
+            if name == MODE:
+                less = FamilyMember(effects - {MODE, COUPLING})
             yield less, _without(family, of, less, name), of.epsilon
         elif name == MODE and RESIDUAL not in effects:
             more = FamilyMember(effects | {MODE})
             yield from ((more, family.without(start, more), of.epsilon) for start in _mode_starts(family, of, measured))
-        elif name != MODE and not (name == RESIDUAL and MODE in effects):
+        elif name != MODE and not (name == RESIDUAL and held_at) and not (name == COUPLING and MODE not in effects):
             yield of.member._replace(effects=effects | {name}), _with(family, of, name), of.epsilon
-    for place in family.held_at if RESIDUAL in effects else ():
+    for place in family.held_at if RESIDUAL in effects and MODE not in effects else ():
         other = FamilyMember(effects - {RESIDUAL} | {MODE}, held_at=place)
         yield other, family.without(of.values, other), of.epsilon
+    for name, instead in ((DELAY, LAG), (LAG, DELAY)):
+        if name in effects and instead in family.effects and instead not in effects:
+            other = of.member._replace(effects=effects - {name} | {instead})
+            yield other, _without(family, of, other, name), of.epsilon
     if MODE in effects and not held_at:
         other = of.member._replace(damped=not damped)
         yield other, family.without(of.values, other), of.epsilon
@@ -225,9 +271,14 @@ def _weighed(
 ) -> Competition:
     """The models whose parameters the lines show, with their weights e^(−cost/2)."""
     lines = int(np.count_nonzero(measured.use))
-    least = min(one.misfit + price(one.member, lines) for one in every)
-    within = [one for one in every if one.misfit + price(one.member, lines) < least + WINDOW]
-    found = [c for one in within if (c := _distribution(family, one, measured, noise_dof, lines)) is not None]
+    found: list[Competitor] = []
+    least = np.inf  # of those whose parameters the lines show
+    for one in sorted(every, key=lambda one: cost(one, lines)):
+        if not cost(one, lines) < least + WINDOW:
+            break
+        if (competitor := _distribution(family, one, measured, noise_dof, lines)) is not None:
+            least = min(least, cost(one, lines))
+            found.append(competitor)
     found.sort(key=lambda c: c.cost)
     if not found:
         return Competition(family, first, (), np.zeros(0))
@@ -249,15 +300,15 @@ def _distribution(
     # Only a bound makes the step to the minimum without bounds large; of a logarithm it is then not exact.
     step = np.where(relative, step.clip(-_UNCERTAIN, _UNCERTAIN), step)
     mean, matrix = of.values[of.free] + outward * step, small * np.outer(outward, outward)
-    cost = of.misfit + price(of.member, lines)
+    evidence = cost(of, lines)
     for i, parameter in enumerate(parameters):
         if parameter.one_sided:
             mean, matrix, factor = _not_negative(mean, matrix, i)
-            cost -= 2 * np.log(factor)
+            evidence -= 2 * np.log(factor)
     whole, values = np.zeros((len(of.values),) * 2), of.values.copy()
     free = np.flatnonzero(of.free)
     whole[np.ix_(free, free)], values[free] = matrix, mean
-    return Competitor(of, values, whole, cost)
+    return Competitor(of, values, whole, evidence)
 
 
 def _not_negative(mean: Floats, matrix: Floats, index: int) -> tuple[Floats, Floats, float]:

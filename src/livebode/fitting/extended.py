@@ -13,7 +13,7 @@ from livebode.fitting.physical import EvaluationGrid, Parameter, PhysicalModel, 
 from livebode.fitting.transfer import Transfer, roots
 from livebode.language import Message
 
-LAG, RESIDUAL, MODE = "lag", "residual compliance", "further mode"
+LAG, RESIDUAL, MODE, COUPLING = "lag", "residual compliance", "further mode", "mode coupling"
 BEYOND = 3.0
 """Frequency of the mode that represents all modes above the band, over the highest line."""
 
@@ -29,6 +29,7 @@ WORDS = {
     LAG: Message("a lag"),
     RESIDUAL: Message("the compliance of modes above the band"),
     MODE: Message("a further mode"),
+    COUPLING: Message("damping that couples both modes"),
 }
 """Effects that a model may lack."""
 
@@ -36,9 +37,11 @@ WORDS = {
 @dataclass(frozen=True)
 class ExtendedModel(PhysicalModel):
     """A model G and some of: a lag behind it, G/(1 + s·lag); a further mode, G + mode_gain·s/(s² + 2ζωs + ω²); the
-    compliance of modes above the band, the same with ω at three times the highest line.
+    compliance of modes above the band, the same with ω at three times the highest line; the coupling of two masses' own
+    mode with the further one, by dampers that do not divide as the springs do: −mode_coupling·s²·ω²/((s² + 2ζ₁ω₁s +
+    ω₁²)·(s² + 2ζωs + ω²)), to first order in the dampings.
 
-    The last two are over s for a position. At the motor their gains are not negative. Its own parameters keep their
+    All but the first are over s for a position. At the motor the gains are not negative. Its own parameters keep their
     meaning: rigid body and first mode (or modes), which those of a chain with one more mass would not.
 
     Parameters
@@ -46,7 +49,7 @@ class ExtendedModel(PhysicalModel):
     base
         The model.
     extras
-        Of "lag", "residual compliance", "further mode".
+        Of "lag", "residual compliance", "further mode", "mode coupling"; the last needs the further mode.
     top_hz
         Highest line.
     unnamed
@@ -83,6 +86,7 @@ class ExtendedModel(PhysicalModel):
         effort = ("m", "N") if getattr(self.base, "linear", False) else ("rad", "(N m)")  # of masses in SI units
         gain = own_gain or f"{effort[0]}/s²/{effort[1]}"
         compliance = f"{gain} s²" if own_gain else f"{effort[0]}/{effort[1]}"
+        mobility = f"{gain} s" if own_gain else f"{effort[0]}/s/{effort[1]}"
         own = {
             LAG: (Parameter("lag", "s", 1e-4, 1e-6, 1.0),),
             RESIDUAL: (Parameter("residual_compliance", compliance, 0.0, least, inf),),
@@ -91,6 +95,7 @@ class ExtendedModel(PhysicalModel):
                 Parameter("mode_damping", "", START_DAMPING, 1e-6, 2.0),
                 Parameter("mode_gain", gain, 0.0, least, inf),
             ),
+            COUPLING: (Parameter("mode_coupling", mobility, 0.0, -inf, inf),),
         }
         return (*self.base.parameters, *(p for extra in self.extras for p in own[extra]))
 
@@ -98,10 +103,15 @@ class ExtendedModel(PhysicalModel):
         own = [p.name for p in self.parameters[len(self.base.parameters) :]]
         values = dict(zip(own, parameters[len(parameters) - len(own) :]))
         above, below = (list(part) for part in self.base.transfer(*parameters[: len(parameters) - len(own)]))
+        coupled: list[Any] = []
+        if COUPLING in self.extras:  # s³ over the masses' own denominator is s² over their mode, but for friction
+            coupled = [-values["mode_coupling"] * (2 * np.pi * values["mode"]) ** 2 * below[0], 0.0, 0.0, 0.0]
         for omega, damping, gain in self._modes(values):
             mode = [1.0, 2 * damping * omega, omega**2]
             moved = [gain, 0.0] if getattr(self.base, "output", "velocity") == "velocity" else [gain]
             above, below = plus(times(above, mode), times(moved, below)), times(below, mode)
+            if coupled:
+                above, coupled = plus(above, coupled), []
         if LAG in self.extras:
             below = times([values["lag"], 1.0], below)
         return above, below
@@ -120,13 +130,13 @@ class ExtendedModel(PhysicalModel):
         return super()._transfer(p)._replace(known=np.concatenate(parts, axis=-1))
 
     def _modes(self, values: dict[str, Any]) -> list[tuple[Any, Any, Any]]:
-        """ω, ζ and gain of each that is added."""
+        """ω, ζ and gain of each that is added, the further mode first."""
         modes: list[tuple[Any, Any, Any]] = []
+        if MODE in self.extras:
+            modes.append((2 * np.pi * values["mode"], values["mode_damping"], values["mode_gain"]))
         if RESIDUAL in self.extras:
             omega = 2 * np.pi * BEYOND * self.top_hz
             modes.append((omega, _BEYOND_DAMPING, values["residual_compliance"] * omega**2))
-        if MODE in self.extras:
-            modes.append((2 * np.pi * values["mode"], values["mode_damping"], values["mode_gain"]))
         return modes
 
     @property
@@ -150,6 +160,8 @@ class ExtendedModel(PhysicalModel):
             if name in self.names:
                 square = scale or (2 * np.pi * values[..., self.names.index("mode")]) ** 2
                 visible[..., self.names.index(name)] = size * square
+        if "mode_coupling" in self.names:
+            visible[..., self.names.index("mode_coupling")] = size * 2 * np.pi * self.top_hz
         return visible
 
     def starts(self, value: Complex, weight: Floats, grid: EvaluationGrid) -> Floats:

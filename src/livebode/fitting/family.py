@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from livebode.arrays import Floats
 from livebode.dataclass import dataclass
-from livebode.fitting.extended import BEYOND, LAG, MODE, RESIDUAL, START_DAMPING, ExtendedModel
+from livebode.fitting.chains import TwoMass
+from livebode.fitting.extended import BEYOND, COUPLING, LAG, MODE, RESIDUAL, START_DAMPING, ExtendedModel
 from livebode.fitting.physical import DELAY, PhysicalModel
 from livebode.fitting.problem import MeasuredRows, Problem, Solution
 from livebode.fitting.rows import covariance, line_weights
@@ -23,8 +24,19 @@ _NO_LAG_S = 1e-14  # a lag whose pole no rate can show
 _NO_FRICTION = 1e-7  # of the smallest that the lines show
 _ROUNDS, _REWEIGHTED, _SAME = (4, 4, 12), 3, 0.03
 _HELD_AT = (1.2, 1.5, 2.0)  # of the highest line: modes of which the lines show the compliance, and not the frequency
-_PARTS = {LAG: ("lag",), RESIDUAL: ("residual_compliance",), MODE: ("mode", "mode_damping", "mode_gain")}
-_NOT_THERE = {"lag": _NO_LAG_S, "residual_compliance": 0.0, "mode_gain": 0.0, "mode_damping": START_DAMPING}
+_PARTS = {
+    LAG: ("lag",),
+    RESIDUAL: ("residual_compliance",),
+    MODE: ("mode", "mode_damping", "mode_gain"),
+    COUPLING: ("mode_coupling",),
+}
+_NOT_THERE = {
+    "lag": _NO_LAG_S,
+    "residual_compliance": 0.0,
+    "mode_gain": 0.0,
+    "mode_damping": START_DAMPING,
+    "mode_coupling": 0.0,
+}
 
 
 def _row(of: Solution, i: int) -> Solution:
@@ -87,6 +99,8 @@ class Family:
         if hasattr(base, "output"):
             nyquist = NEAR_NYQUIST * problem.grid.rate_hz / 2
             extras += [*([RESIDUAL] if BEYOND * top_hz < nyquist else []), MODE]
+        if isinstance(base, TwoMass):
+            extras.append(COUPLING)
         model = ExtendedModel(base, tuple(extras), top_hz)
         own = [name for name in (DELAY, *base.frictions) if name in problem.held and name not in fixed]
         own = [name for name in own if name != DELAY or delay]

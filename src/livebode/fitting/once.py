@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 from livebode.core import COVERAGE, OK, FitError, Parameters, Response, Responses, not_installed, with_bound
 from livebode.dataclass import dataclass
 from livebode.fitting.averaging import Average, average, named_average, positive, specified
-from livebode.fitting.competitors import AllowedChanges, Competition, compete
-from livebode.fitting.extended import WORDS
-from livebode.fitting.family import FittedMember
+from livebode.fitting.competitors import AllowedChanges, Competition, Competitor, compete
+from livebode.fitting.extended import MODE, WORDS
+from livebode.fitting.family import Family, FittedMember
 from livebode.fitting.fitter import Fitter
 from livebode.fitting.mean import mean_response
 from livebode.fitting.patterns import correlation, covariance, follows_pattern, pattern_size
@@ -29,6 +29,7 @@ EPSILON_LARGE = 0.1
 """Model error as a share of |G| from which bounds are not called 95 % bounds, whatever its pattern."""
 
 _NOTABLE = 0.03  # of the weight of the best model: others count too little to be read
+_DAMPINGS_APART = 2.5  # of a mode whose damping the lines do not show: 0.012 and 0.075, as usual in machines
 _ROUNDING = 1e-9  # of a value: rounding gives a quantity of fixed values a bound of this size
 
 
@@ -59,7 +60,8 @@ class Fit:
         Correlation of the residuals of neighbouring lines, if they follow a pattern that no model explains; else None.
     competitors
         Model that all have in common, parameters (a row for each), and weights of the models that the lines do not tell
-        apart; None where there is only the fitted one.
+        apart; None where there is only the fitted one. A model with a mode above the lines has two rows, with less and
+        with more damping of this mode.
     averaged
         Model and parameters of the average over all models that the lines do not tell apart; see `with_unseen`.
     refusal
@@ -316,7 +318,7 @@ def _chosen(plain: Fit, of: Competition, rows: MeasuredRows, noise_dof: NDArray[
     mean, best, pattern, taken = named_average(of), of.every[0].of, None, of.every[0].of.member.effects
     problem, held, fitted = _as_fitted(of, mean, best, rows)
     averaged: Average | None = average(of)
-    if follows_pattern(rows, fitted, noise_dof):
+    if follows_pattern(rows, fitted._replace(response=best.solution.response), noise_dof):
         # No model explains it: the specified model is as good as any, and the others show its possible error.
         pattern = correlation(rows, fitted)
         mean, best, averaged, taken = specified(of), of.first, None, of.first.member.effects
@@ -347,14 +349,30 @@ def _rows_of(
     of: Competition, plain: Fit, fitted: FittedRows
 ) -> tuple[PhysicalModel, Parameters, NDArray[np.float64]] | None:
     """The competitors with 3 % of the weight of the best one and more."""
-    kept = of.weight >= _NOTABLE * of.weight[0]
-    if np.count_nonzero(kept) < 2:
+    family = of.family
+    each = [
+        (value, c.covariance, w / len(values))
+        for c, w in zip(of.every, of.weight)
+        if w >= _NOTABLE * of.weight[0]
+        for values in [_with_dampings(family, c)]
+        for value in values
+    ]
+    if len(each) < 2:
         return None
-    family, every = of.family, [c for c, keep in zip(of.every, kept) if keep]
-    one = _parameters(plain, Average(family.model, every[0].mean, every[0].covariance, frozenset()), fitted)
-    one = one[np.zeros(len(every), dtype=int)]
-    values, matrices = np.array([c.mean for c in every]), np.array([c.covariance for c in every])
-    return family.model, replace(one, value=values, covariance=matrices), of.weight[kept]
+    one = _parameters(plain, Average(family.model, *each[0][:2], frozenset()), fitted)
+    one = one[np.zeros(len(each), dtype=int)]
+    values, matrices, weight = (np.array(part) for part in zip(*each))
+    return family.model, replace(one, value=values, covariance=matrices), weight
+
+
+def _with_dampings(family: Family, of: Competitor) -> list[NDArray[np.float64]]:
+    """The values of a competitor; of a mode above the lines, which do not show its damping, with less and with more."""
+    member = of.of.member
+    if MODE not in member.effects or member.damped or of.mean[family.index("mode")] <= family.top_hz:
+        return [of.mean]
+    values = np.repeat(of.mean[np.newaxis], 2, axis=0)
+    values[:, family.index("mode_damping")] *= [1 / _DAMPINGS_APART, _DAMPINGS_APART]
+    return list(values)
 
 
 def _as_fitted(
