@@ -41,7 +41,7 @@ def among_competitors(read: Margins, fit: Fit, loop: Loop) -> Margins:
     for value, sigma in (("value", "sigma"), ("frequency_hz", "frequency_sigma_hz")):
         middle, columns = getattr(read, value)[-1], np.array(getattr(read, sigma))
         at, own = getattr(each, value), getattr(each, sigma)
-        known = each.ok[:, np.newaxis] & np.isfinite(at) & np.isfinite(own)
+        known = each.ok[:, np.newaxis] & np.isfinite(at) & np.isfinite(own) & np.isfinite(middle)
         share = np.where(known, weight[:, np.newaxis], 0.0)
         total = share.sum(axis=0)
         share = share / np.where(total > 0, total, 1.0)
@@ -49,7 +49,7 @@ def among_competitors(read: Margins, fit: Fit, loop: Loop) -> Margins:
             apart = np.where(known, np.abs(at - middle), 0.0)
         own = np.where(known, own, 0.0)
         spread = np.maximum(np.sqrt(np.sum(share * (own**2 + apart**2), axis=0)), _covering(share, apart, own))
-        columns[-1] = np.where(np.isfinite(middle) & (total > 0), spread, columns[-1])
+        columns[-1] = np.where(total > 0, spread, columns[-1])
         wider[sigma] = columns
     return replace(read, **wider)
 
