@@ -76,6 +76,23 @@ def test_friction_is_in_the_equations_of_motion() -> None:
     assert np.allclose(Rigid().at([0.003, 0.05, 0.0], GRID), held(control.tf([1], [0.003, 0.05])), rtol=1e-9)
 
 
+@pytest.mark.parametrize("output", ["velocity", "position"])
+def test_a_friction_that_vanishes_ends_in_an_integrator(output: str) -> None:
+    """Rows with and without friction, together: each is the response of its equations of motion."""
+    friction = np.array([1e-2, 1e-4, 1e-6, 1e-7, 1e-8, 1e-9, 1e-12, 1e-200, 0.0])
+    values = np.tile([0.003, 0.002, 300.0, 0.02, 0.0, 0.0, 1.3 / RATE_HZ], (len(friction), 1))
+    values[:, 4] = values[:, 5] = friction
+    c = [1, 0, 0, 0] if output == "position" else [0, 0, 1, 0]
+    for value, found in zip(friction, TwoMass(output=output).at(values, GRID)):
+        a, b = chain(np.array([0.003, 0.002]), np.array([300.0]), np.array([0.02]))
+        a[2, 2] -= value / 0.003
+        a[3, 3] -= value / 0.002
+        alone = TwoMass(output=output).at([*values[0, :4], value, value, 0.0], GRID)
+        assert np.allclose(alone, held(control.ss(a, b, [c], 0)), rtol=1e-6)
+        shifted = TwoMass(output=output).at([*values[0, :4], value, value, 1.3 / RATE_HZ], GRID)
+        assert np.allclose(found, shifted, rtol=1e-9)
+
+
 def test_a_belt_moves_its_load_in_metres() -> None:
     belt, shaft = TwoMass(radius_m=0.019, side="load"), TwoMass(side="load")
     turned = BELT * [1, 0.019**2, 0.019**2, 0.019**2, 1, 1, 1]

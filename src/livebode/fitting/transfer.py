@@ -8,10 +8,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from livebode.arrays import Complex, Floats
+from livebode.arrays import Complex, Flags, Floats
 from livebode.core import FitError
 
 _APART = 1e-5  # poles nearer to each other than this share of their size are moved apart
+_SLOW = 2e-7  # of the lowest line: beside an integrator the residue of a slower pole loses more digits than it is worth
 _TINY = 1e-300  # avoids 0/0, and vanishes beside any other number
 
 
@@ -70,6 +71,8 @@ class Transfer(NamedTuple):
         Γ1 = e^(p(1−θ)T)·(e^(pθT) − 1)/p.
         """
         tick = 1 / rate_hz
+        if self.integrators == 1 and (slow := self._slow(float(np.abs(z - 1).min()) * rate_hz)).any():
+            return self._with_integrators(slow, z, rate_hz, delay_s)
         ticks = np.asarray(delay_s, dtype=np.float64) * rate_hz
         whole = np.floor(ticks)
         late = (ticks - whole)[..., np.newaxis, np.newaxis] if np.any(ticks) else None
@@ -86,6 +89,28 @@ class Transfer(NamedTuple):
         if np.any(whole):
             response = response * z ** -whole[..., np.newaxis]
         return np.asarray(response)
+
+    def _slow(self, lowest: float) -> Flags:
+        """Which rows have a pole, by a friction that is almost nothing, that is an integrator for ω ≥ `lowest`."""
+        of = self.denominator
+        if of.shape[-1] == 1:
+            return np.zeros(of.shape[:-1], dtype=np.bool_)
+        return np.asarray(np.abs(of[..., -1]) < _SLOW * lowest * np.abs(of[..., -2]))
+
+    def _with_integrators(self, slow: Flags, z: Complex, rate_hz: float, delay_s: ArrayLike) -> Complex:
+        """As `sampled`, with an integrator in place of the slow pole of these rows."""
+        rows = np.broadcast_shapes(slow.shape, self.numerator.shape[:-1], np.shape(delay_s), z.shape[:-1])
+        slow, delay_s = np.broadcast_to(slow, rows), np.broadcast_to(delay_s, rows)
+        above = np.broadcast_to(self.numerator, (*rows, self.numerator.shape[-1]))
+        below = np.broadcast_to(self.denominator, (*rows, self.denominator.shape[-1]))
+        z = np.broadcast_to(z, (*rows, z.shape[-1]))
+        response = np.empty(z.shape, dtype=np.complex128)
+        response[slow] = Transfer(above[slow], below[slow][..., :-1], 2).sampled(z[slow], rate_hz, delay_s[slow])
+        if not slow.all():
+            known = None if self.known is None else np.broadcast_to(self.known, (*rows, self.known.shape[-1]))[~slow]
+            others = Transfer(above[~slow], below[~slow], 1, known)
+            response[~slow] = others.sampled(z[~slow], rate_hz, delay_s[~slow])
+        return response
 
     def poles(self) -> Complex:
         """Poles without the integrators, shape (..., poles); equal ones are moved apart by a hundred-thousandth."""
