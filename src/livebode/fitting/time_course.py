@@ -17,7 +17,6 @@ FALSE_ALARM = 0.005
 GROUPS_MIN = 6  # with fewer moments, a trend and its scatter have too few degrees of freedom
 _FURTHER = 0.1  # probability of a component too much, once a change is certain
 _COMPONENTS_MAX = 6
-_FREE_MIN = 3
 _ROUNDING = 1e-9  # of a response
 _TAUS = (0.03, 0.06, 0.12, 0.25, 0.5, 1.0)  # time constants that are tried, of the record
 _BESIDE = np.array([2, 3, 4, 5, 6])  # cycles per record beside a periodic variation with which it is compared
@@ -214,7 +213,8 @@ def _scores(left: Sequence[_Remainder], candidates: list[Component]) -> list[Flo
     scores = []
     for each in left:
         functions = np.stack([c.functions(each.share) for c in candidates], axis=1)
-        if each.free - len(functions) < _FREE_MIN:
+        # What explains most of the moments explains their noise, too.
+        if 2 * (each.free - len(functions)) < len(each.share):
             return None
         chance, explained = each.log_chances(functions)
         if candidates[0].kind == "periodic" and len(candidates) > _REFINED:
