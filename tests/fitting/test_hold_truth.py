@@ -91,6 +91,8 @@ def test_a_friction_that_vanishes_ends_in_an_integrator(output: str) -> None:
         assert np.allclose(alone, held(control.ss(a, b, [c], 0)), rtol=1e-6)
         shifted = TwoMass(output=output).at([*values[0, :4], value, value, 1.3 / RATE_HZ], GRID)
         assert np.allclose(found, shifted, rtol=1e-9)
+    none = EvaluationGrid(np.empty(0), RATE_HZ)
+    assert TwoMass(output=output).at(values, none).shape == (len(friction), 0)
 
 
 def test_a_belt_moves_its_load_in_metres() -> None:

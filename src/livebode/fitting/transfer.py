@@ -71,7 +71,7 @@ class Transfer(NamedTuple):
         Γ1 = e^(p(1−θ)T)·(e^(pθT) − 1)/p.
         """
         tick = 1 / rate_hz
-        if self.integrators == 1 and (slow := self._slow(float(np.abs(z - 1).min()) * rate_hz)).any():
+        if self.integrators == 1 and (slow := self._slow(float(np.abs(z - 1).min(initial=2.0)) * rate_hz)).any():
             return self._with_integrators(slow, z, rate_hz, delay_s)
         ticks = np.asarray(delay_s, dtype=np.float64) * rate_hz
         whole = np.floor(ticks)
