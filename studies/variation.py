@@ -68,6 +68,12 @@ class Recording:
         return np.asarray(self.begin + np.outer(self.course(share), self.change))
 
 
+def changes(rng: np.random.Generator, begin: Complex) -> Complex:
+    """Changes of responses by 0.3 … 10 %, in any direction."""
+    size = rng.uniform(0.01, 0.1) * rng.uniform(0.3, 1, begin.shape)
+    return np.asarray(size * begin * np.exp(2j * np.pi * rng.uniform(size=begin.shape)))
+
+
 def recorded(case: Callable[[np.random.Generator], Course], rng: np.random.Generator) -> Recording:
     """The output is the sum of the lines, each with the response of the moment."""
     n, lines = np.arange(WINDOW * PERIODS), len(LINES)
@@ -75,8 +81,7 @@ def recorded(case: Callable[[np.random.Generator], Course], rng: np.random.Gener
     carrier = np.exp(1j * (2 * np.pi * np.outer(LINES.bins, n) / WINDOW + phase[:, np.newaxis]))
     course = case(rng)
     begin = rng.uniform(0.2, 3, lines) * np.exp(2j * np.pi * rng.uniform(size=lines))
-    size = rng.uniform(0.01, 0.1) * rng.uniform(0.3, 1, lines)
-    change = size * begin * np.exp(2j * np.pi * rng.uniform(size=lines))
+    change = changes(rng, begin)
     now = begin[:, np.newaxis] + np.outer(change, course((n + 0.5) / n.size))
     w, y = carrier.real.sum(axis=0), (now * carrier).real.sum(axis=0)
     return Recording(np.array([w, w, y + NOISE * rng.standard_normal(n.size)]), begin, change, course)

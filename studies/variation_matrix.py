@@ -33,7 +33,7 @@ from livebode.fitting import (
 from livebode_matrix import MatrixSettings, MatrixTracker
 from studies.matrix_change import GANTRY
 from studies.matrix_monitoring import TORQUE_N_M, monitored
-from studies.variation import Course, linear, rest, step
+from studies.variation import Course, changes, linear, rest, step
 
 RATE_HZ, NOISE, LPM_NOISE, MOMENTS = 1000.0, 0.1, 0.045, 100  # with about the same noise in a window
 REPETITIONS, PERIODS = 40, {"dwell": 2, "settle": 1}
@@ -76,18 +76,13 @@ class Result:
         return np.asarray(self.begin + np.outer(self.course(share), self.change))
 
 
-def _changes(rng: np.random.Generator, begin: Complex) -> Complex:
-    size = rng.uniform(0.01, 0.1) * rng.uniform(0.3, 1, begin.shape)
-    return np.asarray(size * begin * np.exp(2j * np.pi * rng.uniform(size=begin.shape)))
-
-
 def matrix(case: Callable[[np.random.Generator], Course], rng: np.random.Generator, *, average: bool) -> Result:
     """Two inputs in open loop; each entry has a response of its own at each line, and its change."""
     w = np.tile(EXCITATION.samples, REPETITIONS)
     n, lines = np.arange(w.shape[1]), len(MATRIX_LINES)
     course = case(rng)
     begin = rng.uniform(0.2, 3, (lines, 2, 2)) * np.exp(2j * np.pi * rng.uniform(size=(lines, 2, 2)))
-    change = _changes(rng, begin)
+    change = changes(rng, begin)
     turn = np.exp(2j * np.pi * np.outer(MATRIX_LINES.bins, n) / MATRIX_LINES.window)
     of_experiment = EXCITATION.spectra.transpose(2, 1, 0) / 1j  # amplitudes of sines
     dwell = PERIODS["dwell"] * MATRIX_LINES.window

@@ -13,7 +13,7 @@ from livebode.records import RunRecord
 
 def newest_average(run: RunRecord, newest: MatrixResponses) -> MatrixResponses:
     """The newest matrix of a run, as one row, with the change that the run found in its averages; else unchanged."""
-    if not (run.summary.get("drift") or {}).get("found") or not _averages(run):
+    if not _has_changing_averages(run):
         return newest
     found = run.found
     experiments, window = found["experiments"], found["window"]
@@ -25,13 +25,14 @@ def newest_average(run: RunRecord, newest: MatrixResponses) -> MatrixResponses:
     return matrix_with_drift(newest, test.result())
 
 
-def _averages(run: RunRecord) -> bool:
-    return bool((run.summary.get("configuration", {}).get("tracking") or {}).get("average"))
+def _has_changing_averages(run: RunRecord) -> bool:
+    tracking = run.summary.get("configuration", {}).get("tracking") or {}
+    return bool(tracking.get("average") and (run.summary.get("drift") or {}).get("found"))
 
 
 def entry_average(run: RunRecord, average: Responses) -> Responses:
     """The newest average of the view of one entry, of one row, as `newest_average`."""
-    if run.selected is None or not _averages(run) or not (run.summary.get("drift") or {}).get("found"):
+    if run.selected is None or not _has_changing_averages(run):
         return average
     whole = RunRecord.open(run.path, matrix=True)
     parts = [part[part.sample == average.sample[0]] for part in whole.undamaged(whole.matrix_batches())]

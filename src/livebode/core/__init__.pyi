@@ -26,6 +26,7 @@ from livebode.core._response import PER_RESPONSE as PER_RESPONSE
 from livebode.core._response import Response as Response
 from livebode.core._response import Responses as Responses
 from livebode.core._response import widened as widened
+from livebode.core._response import with_distortion as with_distortion
 from livebode.core._spectra import LEFT_OUT as LEFT_OUT
 from livebode.core._spectra import NOT_WHOLE as NOT_WHOLE
 from livebode.core._spectra import SPIKE as SPIKE

@@ -39,6 +39,15 @@ def widened(sigma: ArrayLike, dof: ArrayLike, c: float) -> Floats:
     return np.asarray(sigma * factor)
 
 
+def with_distortion(sigma: Floats, distortion: Floats) -> Floats:
+    """Standard deviation `sigma` with a distortion, which counts where it is known, that is finite.
+
+    >>> with_distortion(np.array([3.0, 3.0, 3.0]), np.array([4.0, np.nan, np.inf]))
+    array([5., 3., 3.])
+    """
+    return np.asarray(np.hypot(sigma, np.where(np.isfinite(distortion), distortion, 0.0)))
+
+
 @dataclass(frozen=True, eq=False)
 class Response(FrequencyResponse):
     """The frequency response of a machine at one moment, at Lines. Immutable.

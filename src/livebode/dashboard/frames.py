@@ -33,7 +33,7 @@ from typing import Any
 import numpy as np
 
 from livebode.arrays import Floats
-from livebode.core import CIRCLE_FACTOR, Quantity, Responses, widened
+from livebode.core import CIRCLE_FACTOR, Quantity, Responses, widened, with_distortion
 from livebode.dashboard.quantities import QUANTITIES
 from livebode.pictures import unwrapped
 from livebode.records import to_json
@@ -69,19 +69,9 @@ def frame(kind: str, axis: int, responses: Responses) -> bytes:
     times = (responses.time_s, responses.schedule, responses.dof)
     curves = [magnitude, phase, reach, np.where(use, responses.coherence, np.nan)]
     if kind in _WITH_PARTS:
-        curves += [_widened(part, responses) / size for part in _inner_parts(responses)]
+        inner = responses.noise, with_distortion(responses.noise, responses.distortion)
+        curves += [widened(part, responses.dof[:, np.newaxis], CIRCLE_FACTOR) / size for part in inner]
     return _packed(head, times, curves)
-
-
-def _inner_parts(responses: Responses) -> tuple[Floats, Floats]:
-    """Sigma of the noise, and of noise and distortion, (rows, lines)."""
-    distortion = np.where(np.isfinite(responses.distortion), responses.distortion, 0.0)
-    return responses.noise, np.hypot(responses.noise, distortion)
-
-
-def _widened(sigma: Floats, responses: Responses) -> Floats:
-    """The radius of 95 % of a part of sigma, (rows, lines)."""
-    return widened(sigma, responses.dof[:, np.newaxis], CIRCLE_FACTOR)
 
 
 def curve(kind: str, axis: int, quantity: Quantity, time_s: float, value: np.ndarray[Any, Any]) -> bytes:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from livebode.arrays import Complex, Floats
-from livebode.core import Response, Responses, SignalError
+from livebode.core import Response, Responses, SignalError, with_distortion
 from livebode.fitting.drift import Drift, DriftTest
 
 _FIRST_VERDICT = 3  # windows that may be valid before the first verdict: three periods, of which two are complete
@@ -257,7 +257,7 @@ def with_drift(average: Responses, drift: Drift) -> Responses:
         return average
     apart = np.nan_to_num(average.variation) > 0
     noise = np.where(apart | ~average.valid, average.noise, drift.noise(average.noise[0]))
-    repeated = np.hypot(noise, np.where(np.isfinite(average.distortion), average.distortion, 0.0))
+    repeated = with_distortion(noise, average.distortion)
     variation = np.where(average.valid, drift.variation(repeated[0]), np.nan)
     return replace(average, sigma=np.where(average.valid, np.hypot(repeated, variation), np.nan), variation=variation)
 

@@ -98,18 +98,19 @@ class Transfer(NamedTuple):
         return np.asarray(np.abs(of[..., -1]) < _SLOW * lowest * np.abs(of[..., -2]))
 
     def _with_integrators(self, slow: Flags, z: Complex, rate_hz: float, delay_s: ArrayLike) -> Complex:
-        """As `sampled`, with an integrator in place of the slow pole of these rows."""
+        """As `sampled`, with an integrator in place of the slowest pole of these rows."""
         rows = np.broadcast_shapes(slow.shape, self.numerator.shape[:-1], np.shape(delay_s), z.shape[:-1])
-        slow, delay_s = np.broadcast_to(slow, rows), np.broadcast_to(delay_s, rows)
-        above = np.broadcast_to(self.numerator, (*rows, self.numerator.shape[-1]))
-        below = np.broadcast_to(self.denominator, (*rows, self.denominator.shape[-1]))
+        n, d = (np.broadcast_to(x, (*rows, x.shape[-1])) for x in (self.numerator, self.denominator))
         z = np.broadcast_to(z, (*rows, z.shape[-1]))
+        poles = np.broadcast_to(self.poles(), (*rows, d.shape[-1] - 1))
+        slow, delay_s = np.broadcast_to(slow, rows), np.broadcast_to(delay_s, rows)
+        others = np.take_along_axis(poles, np.argsort(np.abs(poles), axis=-1)[..., 1:], axis=-1)
         response = np.empty(z.shape, dtype=np.complex128)
-        response[slow] = Transfer(above[slow], below[slow][..., :-1], 2).sampled(z[slow], rate_hz, delay_s[slow])
-        if not slow.all():
-            known = None if self.known is None else np.broadcast_to(self.known, (*rows, self.known.shape[-1]))[~slow]
-            others = Transfer(above[~slow], below[~slow], 1, known)
-            response[~slow] = others.sampled(z[~slow], rate_hz, delay_s[~slow])
+        for chosen, of in (
+            (slow, Transfer(n[slow], d[slow][..., :-1], 2, others[slow])),
+            (~slow, Transfer(n[~slow], d[~slow], 1, poles[~slow])),
+        ):
+            response[chosen] = of.sampled(z[chosen], rate_hz, delay_s[chosen])
         return response
 
     def poles(self) -> Complex:

@@ -21,6 +21,7 @@ from livebode.core import (
     UsageError,
     hand_over,
     ignore,
+    with_distortion,
 )
 from livebode.estimation import NOTHING, Settings, Tracker, contains
 from livebode.motion.chunk import Chunk, PendingResponses, RecentSamples
@@ -28,7 +29,7 @@ from livebode.motion.learner import Learner, ReplayResult, frozen
 from livebode.motion.model import MovingModel
 from livebode.motion.orders import RippleMonitor
 from livebode.motion.replay import Scatter, by_excitation, drive_of, residual
-from livebode.motion.residual_distortion import ResidualDistortion, with_distortion
+from livebode.motion.residual_distortion import ResidualDistortion
 from livebode.motion.standstill import StandstillDetector, without
 
 

@@ -63,8 +63,3 @@ class ResidualDistortion(StatefulBase):
         complete = np.isfinite(signals).all(axis=0).reshape(count, self._window).all(axis=1)
         periods = Periods.of(signals, chunk.x[part], complete, self._window)
         self._periods.process(periods, np.ones(count, dtype=np.bool_), clock)
-
-
-def with_distortion(sigma: Floats, distortion: Floats) -> Floats:
-    """Sigma with the distortion where it is known."""
-    return np.asarray(np.hypot(sigma, np.where(np.isfinite(distortion), distortion, 0.0)))
